@@ -1,0 +1,90 @@
+"""Validation at the boundary: each check returns clean float64 numbers or raises.
+
+Each public function of the package checks its arguments once, here; inside, types are trusted.
+Comparisons are written so that NaN fails them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from limit_surface_ros.errors import NotFiniteError, RangeError, ShapeError, ZeroVectorError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Floats: TypeAlias = NDArray[np.float64]
+    Bools: TypeAlias = NDArray[np.bool_]
+
+
+def as_floats(name: str, values: ArrayLike) -> Floats:
+    """Return `values` as a finite float64 array of any shape.
+
+    Args:
+        name: What the values are, for the error.
+        values: Any nested sequence of numbers.
+
+    Raises:
+        ShapeError: The values are ragged or no numbers.
+        NotFiniteError: A value is NaN or infinite; the error gives the first one's place.
+    """
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ShapeError(f"{name} must be an array of numbers: {error}") from None
+    if not np.isfinite(array).all():
+        place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        where = f" at index {place}" if place else ""
+        raise NotFiniteError(f"{name} must be finite, got {array[place]}{where}")
+    return array
+
+
+def as_vectors(name: str, values: ArrayLike) -> Floats:
+    """Return `values` as a finite float64 array of shape (..., 3).
+
+    Args:
+        name: What one vector is, "wrench" or "twist", for the error.
+        values: One vector of three components, or many in the leading axes.
+
+    Raises:
+        ShapeError: The last axis does not hold three components.
+        NotFiniteError: A component is NaN or infinite.
+    """
+    array = as_floats(name, values)
+    if array.ndim == 0 or array.shape[-1] != 3:
+        raise ShapeError(f"{name} must have shape (..., 3), got {array.shape}")
+    return array
+
+
+def as_directions(name: str, values: ArrayLike) -> Floats:
+    """Return `values` as `as_vectors` does, and refuse vectors that are zero.
+
+    Raises:
+        ShapeError: The last axis does not hold three components.
+        NotFiniteError: A component is NaN or infinite.
+        ZeroVectorError: A vector is zero; the error gives the first one's place.
+    """
+    array = as_vectors(name, values)
+    zero = ~array.any(axis=-1)
+    if zero.any():
+        place = tuple(int(i) for i in np.argwhere(zero)[0])
+        where = f" at index {place}" if place else ""
+        raise ZeroVectorError(f"{name} must not be zero: it has no direction{where}")
+    return array
+
+
+def as_positive(name: str, value: float) -> float:
+    """Return `value` as a finite float above zero.
+
+    Raises:
+        RangeError: The value is not a number above zero, or not finite.
+    """
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise RangeError(f"{name} must be a number above 0, got {value!r}") from None
+    if not 0.0 < number < float("inf"):
+        raise RangeError(f"{name} must be a finite number above 0, got {number}")
+    return number

@@ -1,0 +1,1 @@
+"""Decay models: memory kernel, delay system, characteristic roots, sums of exponentials."""

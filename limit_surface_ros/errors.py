@@ -1,0 +1,102 @@
+"""The package's one family of errors.
+
+Every error that the package raises on purpose derives from `LimitSurfaceError` *and* from the
+builtin that fits it, so that library users may catch either. `code` names the constant of
+`limit_surface_interfaces/msg/ErrorCode` by which a service reports the error; a test holds that
+map total.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+
+class LimitSurfaceError(Exception):
+    """Base of every error that this package raises on purpose."""
+
+    code: ClassVar[str] = "INTERNAL"
+
+
+class ShapeError(LimitSurfaceError, ValueError):
+    """An array has the wrong shape or cannot be read as numbers."""
+
+    code = "BAD_SHAPE"
+
+
+class NotFiniteError(LimitSurfaceError, ValueError):
+    """A number is NaN or infinite."""
+
+    code = "NOT_FINITE"
+
+
+class ZeroVectorError(LimitSurfaceError, ValueError):
+    """A wrench or twist is zero, so that it has no direction."""
+
+    code = "ZERO_VECTOR"
+
+
+class RangeError(LimitSurfaceError, ValueError):
+    """A number lies outside the range that is accepted for it."""
+
+    code = "OUT_OF_RANGE"
+
+
+class MatrixError(LimitSurfaceError, ValueError):
+    """A matrix is not symmetric positive semidefinite where it must be."""
+
+    code = "BAD_MODEL"
+
+
+class GeometryError(LimitSurfaceError, ValueError):
+    """A contact patch is empty, degenerate or carries no load."""
+
+    code = "BAD_MODEL"
+
+
+class DataError(LimitSurfaceError, ValueError):
+    """Recorded or simulated data cannot support what is asked of them."""
+
+    code = "BAD_DATA"
+
+
+class FileError(LimitSurfaceError, ValueError):
+    """A file cannot be read or written; the message names file, place and what is accepted."""
+
+    code = "BAD_FILE"
+
+
+class UnknownModelError(LimitSurfaceError, LookupError):
+    """No model of that name is loaded."""
+
+    code = "UNKNOWN_MODEL"
+
+
+class FrameError(LimitSurfaceError, ValueError):
+    """A message's frame is empty or is not the model's, and no transform is known."""
+
+    code = "UNKNOWN_FRAME"
+
+
+class SolverError(LimitSurfaceError, ArithmeticError):
+    """A numerical method could not certify its answer."""
+
+    code = "NO_CONVERGENCE"
+
+
+class UnstableError(LimitSurfaceError, ArithmeticError):
+    """A response would give, or a delay system has, growing solutions."""
+
+    code = "BAD_MODEL"
+
+
+class MissingExtraError(LimitSurfaceError, ImportError):
+    """An optional library is absent; the message names the extra that brings it."""
+
+    code = "INTERNAL"
+
+    def __init__(self, library: str, extra: str) -> None:
+        """Name the missing `library` and the `extra` of this package that installs it."""
+        super().__init__(
+            f"{library} is needed here and is not installed: "
+            f"pip install 'limit_surface_ros[{extra}]' or pip install {library}"
+        )

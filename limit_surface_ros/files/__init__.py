@@ -1,0 +1,1 @@
+"""Model and data files to validated objects, and back."""

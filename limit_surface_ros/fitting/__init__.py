@@ -1,0 +1,1 @@
+"""Offline fits of limit surfaces to pairs of wrench and twist; never imported by a node."""

@@ -1,0 +1,1 @@
+"""Pictures; matplotlib is an optional extra and imported where it is used."""
