@@ -15,10 +15,20 @@ EXTRAS = {
     "peers": ["cvxpy"],
 }
 
+# Each program's name and the module whose main() it runs.
+PROGRAMS: dict[str, str] = {}
+
+
+def installed_files(folder: str) -> tuple[str, list[str]]:
+    """Return a data_files entry that installs the files of `folder` under share/."""
+    files = sorted(str(path) for path in Path(folder).glob("*") if path.is_file())
+    return f"share/{PACKAGE}/{folder}", files
+
+
 setup(
     name=PACKAGE,
     version="0.1.0",
-    description="Limit surfaces of sliding bodies and decay models, fitted offline and served over ROS 2",
+    description="Limit surfaces of sliding bodies and decay models, fitted and served over ROS 2",
     license="Apache-2.0",
     maintainer="limit_surface_ros maintainers",
     maintainer_email="maintainers@users.noreply.github.com",
@@ -27,17 +37,14 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
-        *(
-            (f"share/{PACKAGE}/{folder}", [str(path) for path in Path(folder).iterdir() if path.is_file()])
-            for folder in ("config", "launch")
-        ),
+        installed_files("config"),
+        installed_files("launch"),
     ],
     python_requires=">=3.10",
     install_requires=["numpy", "scipy", "pyyaml"],
     extras_require=EXTRAS,
     zip_safe=False,
     entry_points={
-        "console_scripts": [
-        ],
+        "console_scripts": [f"{name} = {module}:main" for name, module in PROGRAMS.items()],
     },
 )
