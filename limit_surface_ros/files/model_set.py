@@ -1,0 +1,112 @@
+"""Named models read from files, all or none: what a node serves.
+
+A set is immutable. To load other files, build another set and swap it in: while building fails,
+the old one is untouched.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
+
+from limit_surface_ros.errors import FileError, UnknownModelError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+
+class Named(Protocol):
+    """Anything that a model file holds."""
+
+    @property
+    def name(self) -> str:
+        """By which services ask for it."""
+        ...
+
+
+Model = TypeVar("Model", bound=Named)
+
+
+class ModelSet(Generic[Model]):
+    """Models by name, one of them the default.
+
+    Args:
+        models: The models, at least one, no two of one name.
+        default: Name of the model that an empty name stands for; empty: the first.
+
+    Raises:
+        FileError: There is no model, or two have one name.
+        UnknownModelError: The default is not among them.
+    """
+
+    def __init__(self, models: Iterable[Model], default: str = "") -> None:
+        """Index the models by name."""
+        self._models: dict[str, Model] = {}
+        for model in models:
+            if model.name in self._models:
+                raise FileError(f"two model files hold a model named {model.name!r}")
+            self._models[model.name] = model
+        if not self._models:
+            raise FileError("no model file is given; at least one is needed")
+        self.default = default or next(iter(self._models))
+        self[self.default]
+
+    def __getitem__(self, name: str) -> Model:
+        """Return the model of that name; an empty name is the default model's.
+
+        Raises:
+            UnknownModelError: No model has that name; the error lists those that are loaded.
+        """
+        try:
+            return self._models[name or self.default]
+        except KeyError:
+            loaded = ", ".join(self._models)
+            raise UnknownModelError(f"no model {name!r} is loaded; loaded are {loaded}") from None
+
+    def __iter__(self) -> Iterator[Model]:
+        """Iterate over the models in the order of their files."""
+        return iter(self._models.values())
+
+    def __len__(self) -> int:
+        """Return the number of models."""
+        return len(self._models)
+
+
+def model_paths(entries: Iterable[str | Path]) -> list[Path]:
+    """Return the model files that `entries` name: files as they are, folders as their *.yaml.
+
+    Raises:
+        FileError: An entry is empty or does not exist, or a folder holds no *.yaml.
+    """
+    paths: list[Path] = []
+    for entry in entries:
+        if not str(entry):
+            raise FileError("an entry of the model files is empty")
+        path = Path(entry).expanduser()
+        if path.is_dir():
+            inside = sorted(path.glob("*.yaml"))
+            if not inside:
+                raise FileError(f"{path}: the folder holds no *.yaml file")
+            paths += inside
+        elif path.exists():
+            paths.append(path)
+        else:
+            raise FileError(f"{path}: no such file or folder")
+    return paths
+
+
+def read_model_set(
+    entries: Iterable[str | Path], read: Callable[[Path], Model], default: str = ""
+) -> ModelSet[Model]:
+    """Read all files and folders that `entries` name into one set.
+
+    Args:
+        entries: Model files, or folders whose *.yaml are taken.
+        read: Reader of one file, such as `read_surface_model`.
+        default: Name of the default model; empty: the first.
+
+    Raises:
+        FileError: A file is absent or not valid, or two models share a name.
+        UnknownModelError: The default is not among the models.
+    """
+    return ModelSet([read(path) for path in model_paths(entries)], default)

@@ -1,0 +1,319 @@
+"""YAML files to checked values, and back: the one reader and writer of all model files.
+
+A `Section` is a mapping of a YAML file that knows where it stands, so that each error names the
+file, the key, what was found and what is accepted. PyYAML reads `1e-3` as text and accepts `.nan`;
+both are caught here. Writing is atomic: readers see the old file or the new one, never a part.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import yaml
+
+from limit_surface_ros.errors import FileError, LimitSurfaceError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Mapping
+
+    from limit_surface_ros.checks import Floats
+
+_REQUIRED: Any = object()
+# libyaml reads about ten times as fast and is there on every common platform.
+_SafeLoader: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+class _Loader(_SafeLoader):  # type: ignore[misc, valid-type]
+    """PyYAML's safe loader, but a key given twice is an error and not a silent loss."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """Build a mapping and refuse duplicate keys."""
+        keys = [self.construct_object(key, deep=True) for key, _ in node.value]
+        for i, key in enumerate(keys):
+            if key in keys[:i]:
+                raise yaml.MarkedYAMLError(
+                    problem=f"key {key!r} is given twice", problem_mark=node.value[i][0].start_mark
+                )
+        mapping: dict[Any, Any] = super().construct_mapping(node, deep)
+        return mapping
+
+
+class _Dumper(yaml.SafeDumper):
+    """PyYAML's safe dumper, but a row of scalars stands on one line and mappings never do."""
+
+
+def _represent_list(dumper: yaml.SafeDumper, values: list[Any]) -> yaml.Node:
+    row = not any(isinstance(value, (list, dict)) for value in values)
+    return dumper.represent_sequence("tag:yaml.org,2002:seq", values, flow_style=row)
+
+
+_Dumper.add_representer(list, _represent_list)
+
+
+class Section:
+    """A mapping in a YAML file: typed access to its keys, errors that say where.
+
+    Args:
+        path: The file, for errors.
+        values: The mapping.
+        prefix: Keys of the enclosing sections, joined by dots.
+    """
+
+    def __init__(self, path: Path, values: Mapping[str, Any], prefix: str = "") -> None:
+        """Start with none of the keys asked for."""
+        self.path = path
+        self.values = values
+        self._prefix = prefix
+        self._known: list[str] = []
+
+    def __contains__(self, key: str) -> bool:
+        """Tell whether the key is given and not null."""
+        return self.values.get(key) is not None
+
+    def error(self, key: str, message: str) -> FileError:
+        """Return the error that places `message` at `key` of this file."""
+        return FileError(f"{self.path}: {self._prefix}{key}: {message}")
+
+    def _get(self, key: str, default: Any) -> Any:
+        self._known.append(key)
+        value = self.values.get(key)
+        if value is not None:
+            return value
+        if default is _REQUIRED:
+            raise self.error(key, "missing")
+        return default
+
+    def text(self, key: str, default: Any = _REQUIRED) -> Any:
+        """Return a text that is not empty, or the default as it is."""
+        value = self._get(key, default)
+        if value is default:
+            return default
+        if not isinstance(value, str) or not value.strip():
+            raise self.error(key, f"must be a text that is not empty, got {value!r}")
+        return value
+
+    def choice(self, key: str, accepted: Collection[Any], default: Any = _REQUIRED) -> Any:
+        """Return one of the accepted values."""
+        value = self._get(key, default)
+        # True == 1 in Python, but a schema of `true` is a mistake.
+        if value not in accepted or isinstance(value, bool):
+            listed = ", ".join(str(option) for option in accepted)
+            raise self.error(key, f"must be one of {listed}; got {value!r}")
+        return value
+
+    def number(
+        self,
+        key: str,
+        default: Any = _REQUIRED,
+        *,
+        above: float = -math.inf,
+        at_least: float = -math.inf,
+        at_most: float = math.inf,
+    ) -> Any:
+        """Return a finite float within the bounds, or the default as it is."""
+        value = self._get(key, default)
+        if value is default:
+            return default
+        number = self._finite(key, value)
+        if not (number > above and at_least <= number <= at_most):
+            bounds = [f"above {above}"] * (above > -math.inf)
+            bounds += [f"at least {at_least}"] * (at_least > -math.inf)
+            bounds += [f"at most {at_most}"] * (at_most < math.inf)
+            raise self.error(key, f"must be {' and '.join(bounds)}, got {number}")
+        return number
+
+    def integer(self, key: str, default: Any = _REQUIRED, *, at_least: int = 0) -> Any:
+        """Return a whole number not below `at_least`, or the default as it is."""
+        value = self._get(key, default)
+        if value is default:
+            return default
+        if isinstance(value, bool) or not isinstance(value, int) or value < at_least:
+            raise self.error(key, f"must be a whole number from {at_least} on, got {value!r}")
+        return value
+
+    def array(self, key: str, shape: tuple[int | None, ...], default: Any = _REQUIRED) -> Any:
+        """Return a float64 array of that shape; None stands for any length above zero.
+
+        Raises:
+            FileError: The key is missing, no array of finite numbers, or of another shape.
+        """
+        value = self._get(key, default)
+        if value is default:
+            return default
+        array = self._numbers(key, value)
+        fits = array.ndim == len(shape) and all(
+            given > 0 if wanted is None else given == wanted
+            for given, wanted in zip(array.shape, shape, strict=True)
+        )
+        if not fits:
+            wanted = " x ".join("n" if length is None else str(length) for length in shape)
+            given = " x ".join(map(str, array.shape)) or "a single number"
+            raise self.error(key, f"must be an array of {wanted} numbers, got {given}")
+        return array
+
+    def section(self, key: str, default: Any = _REQUIRED) -> Section:
+        """Return the mapping under a key."""
+        value = self._get(key, default)
+        if not isinstance(value, dict):
+            raise self.error(key, f"must be a mapping of keys to values, got {value!r}")
+        return Section(self.path, value, f"{self._prefix}{key}.")
+
+    def sections(self, key: str) -> list[Section]:
+        """Return the mappings in the list under a key."""
+        value = self._get(key, _REQUIRED)
+        if not isinstance(value, list) or not value:
+            raise self.error(key, f"must be a list of mappings, got {value!r}")
+        for i, item in enumerate(value):
+            if not isinstance(item, dict):
+                raise self.error(f"{key}[{i}]", f"must be a mapping, got {item!r}")
+        return [
+            Section(self.path, item, f"{self._prefix}{key}[{i}].") for i, item in enumerate(value)
+        ]
+
+    def raw(self, key: str, default: Any = _REQUIRED) -> Any:
+        """Return what stands under a key, whatever it is."""
+        return self._get(key, default)
+
+    def finish(self) -> None:
+        """Refuse keys that nobody asked for: most are misspelt.
+
+        Raises:
+            FileError: A key is unknown; the error lists those that are accepted here.
+        """
+        unknown = [key for key in self.values if key not in self._known]
+        if unknown:
+            accepted = ", ".join(self._known)
+            raise self.error(str(unknown[0]), f"is not known here; accepted are {accepted}")
+
+    def _numbers(self, key: str, value: Any) -> Floats:
+        if isinstance(value, list):
+            parts = [self._numbers(f"{key}[{i}]", item) for i, item in enumerate(value)]
+            if len({part.shape for part in parts}) > 1:
+                raise self.error(key, "its rows must have one length")
+            return np.array(parts)
+        return np.array(self._finite(key, value))
+
+    def _finite(self, key: str, value: Any) -> float:
+        if isinstance(value, str):
+            try:
+                number = float(value)
+            except ValueError:
+                pass
+            else:
+                raise self.error(
+                    key, f"{value!r} is text in YAML 1.1; write it as the number {number!r}"
+                )
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise self.error(key, f"must be a number, got {value!r}")
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
+        if not math.isfinite(number):
+            raise self.error(key, f"must be finite, got {value}")
+        return number
+
+
+def read_yaml(path: str | Path) -> Section:
+    """Read a YAML file whose top level is a mapping.
+
+    Raises:
+        FileError: The file is absent, unreadable, no YAML, or no mapping.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError as error:
+        raise FileError(f"{path}: is not UTF-8 text: {error}") from None
+    try:
+        # _Loader is a safe loader: it builds plain Python values only.
+        values = yaml.load(text, Loader=_Loader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
+        raise FileError(f"{path}: {where}{error.problem or error}") from None
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        raise FileError(f"{path}: is not YAML: {error}") from None
+    if not isinstance(values, dict):
+        kind = "is empty" if values is None else f"holds {type(values).__name__} at its top level"
+        raise FileError(f"{path}: {kind}; a mapping of keys to values is accepted")
+    return Section(path, values)
+
+
+def place_errors(section: Section, key: str, build: Callable[[], Any]) -> Any:
+    """Call `build` and turn the package's errors into one that names file and key."""
+    try:
+        return build()
+    except FileError:
+        raise
+    except LimitSurfaceError as error:
+        raise section.error(key, str(error)) from error
+
+
+def write_atomically(path: str | Path, text: str) -> None:
+    """Write a text file in one step: whoever reads sees all of it or what was there before.
+
+    Raises:
+        FileError: The folder is absent or not writable, or the disk is full.
+    """
+    path = Path(path)
+    part: Path | None = None
+    try:
+        with tempfile.NamedTemporaryFile(
+            "w", encoding="utf-8", dir=path.parent, prefix=f".{path.name}.", delete=False
+        ) as stream:
+            part = Path(stream.name)
+            stream.write(text)
+            stream.flush()
+            os.fsync(stream.fileno())
+        # Temporary files are private; a model file is for everybody whom the umask lets in.
+        umask = os.umask(0)
+        os.umask(umask)
+        part.chmod(0o666 & ~umask)
+        part.replace(path)
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written: {error.strerror or error}") from None
+    finally:
+        if part is not None:
+            part.unlink(missing_ok=True)
+
+
+def plain(value: Any) -> Any:
+    """Return `value` with numpy arrays, numpy numbers and tuples as plain lists and numbers."""
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    return value
+
+
+def write_yaml(path: str | Path, values: Mapping[str, Any], header: str = "") -> None:
+    """Write a mapping to a YAML file, atomically; floats come back bit for bit.
+
+    Args:
+        path: The file, in a folder that exists.
+        values: Keys in the order in which they are written; numpy arrays are welcome.
+        header: Lines of a comment at the top, without the `#`.
+
+    Raises:
+        FileError: The file cannot be written.
+    """
+    comment = "".join(f"# {line}".rstrip() + "\n" for line in header.splitlines())
+    body = yaml.dump(
+        plain(dict(values)),
+        Dumper=_Dumper,
+        sort_keys=False,
+        default_flow_style=False,
+        width=99,
+        allow_unicode=True,
+    )
+    write_atomically(path, comment + body)

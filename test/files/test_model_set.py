@@ -1,0 +1,63 @@
+"""A set of models is read whole or not at all, and finds models by name."""
+
+from dataclasses import dataclass
+
+import pytest
+
+from limit_surface_ros.errors import FileError, UnknownModelError
+from limit_surface_ros.files.model_set import ModelSet, read_model_set
+
+
+@dataclass
+class Named:
+    name: str
+
+
+def read(path):
+    if "bad" in path.name:
+        raise FileError(f"{path}: bad")
+    return Named(path.stem)
+
+
+def test_the_first_model_is_the_default_unless_another_is_named():
+    models = [Named("a"), Named("b")]
+    assert ModelSet(models)[""].name == "a"
+    assert ModelSet(models, "b")[""].name == "b"
+    assert ModelSet(models, "b")["a"].name == "a"
+
+
+def test_an_unknown_name_is_refused_with_the_names_that_are_loaded():
+    with pytest.raises(UnknownModelError, match="no model 'c' is loaded; loaded are a, b"):
+        ModelSet([Named("a"), Named("b")])["c"]
+    with pytest.raises(UnknownModelError, match="no model 'c'"):
+        ModelSet([Named("a")], "c")
+
+
+def test_two_models_of_one_name_and_no_model_at_all_are_refused():
+    with pytest.raises(FileError, match="two model files hold a model named 'a'"):
+        ModelSet([Named("a"), Named("a")])
+    with pytest.raises(FileError, match="no model file is given"):
+        ModelSet([])
+
+
+def test_a_folder_stands_for_its_yaml_files_in_the_order_of_their_names(tmp_path):
+    for name in ("b.yaml", "a.yaml", "notes.txt", ".part.yaml.x"):
+        (tmp_path / name).touch()
+    assert [model.name for model in read_model_set([tmp_path], read)] == ["a", "b"]
+
+
+def test_one_bad_file_or_entry_refuses_the_whole_set(tmp_path):
+    good = tmp_path / "good.yaml"
+    bad = tmp_path / "bad.yaml"
+    good.touch()
+    bad.touch()
+    (tmp_path / "empty").mkdir()
+    assert len(read_model_set([good], read)) == 1
+    for entries, message in (
+        ([good, bad], "bad.yaml: bad"),
+        ([good, tmp_path / "absent.yaml"], "absent.yaml: no such file or folder"),
+        ([good, tmp_path / "empty"], "the folder holds no"),
+        ([good, ""], "an entry of the model files is empty"),
+    ):
+        with pytest.raises(FileError, match=message):
+            read_model_set(entries, read)

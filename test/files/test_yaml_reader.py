@@ -1,0 +1,135 @@
+"""Files read through `Section` give clean values or say file, key, fault and what is accepted."""
+
+import os
+import stat
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from limit_surface_ros.errors import FileError
+from limit_surface_ros.files.yaml_reader import read_yaml, write_atomically, write_yaml
+
+
+@pytest.fixture
+def section_of(tmp_path):
+    def write(text):
+        path = tmp_path / "model.yaml"
+        path.write_text(text)
+        return read_yaml(path)
+
+    return write
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x: 1e-3", r"model.yaml: x: '1e-3' is text in YAML 1.1; write it as the number 0.001"),
+        ("x: .nan", "x: must be finite, got nan"),
+        ("x: -.inf", "x: must be finite, got -inf"),
+        ("x: true", "x: must be a number, got True"),
+        ("x: [1]", r"x: must be a number, got \[1"),
+        ("x: 0.0", "x: must be above 0.0 and at most 2.0, got 0.0"),
+        ("x: 3", "x: must be above 0.0 and at most 2.0, got 3.0"),
+        ("y: 1", "x: missing"),
+        ("x: null", "x: missing"),
+        (f"x: 1{'0' * 400}", "x: must be finite"),
+    ],
+)
+def test_a_number_that_is_not_acceptable_is_refused_with_its_key(section_of, text, message):
+    with pytest.raises(FileError, match=message):
+        section_of(text).number("x", above=0.0, at_most=2.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("m: [[1, 2], [3]]", "m: its rows must have one length"),
+        ("m: [[1, 2], [3, .nan]]", r"m\[1\]\[1\]: must be finite, got nan"),
+        ("m: [[1, 2], [3, 1e5]]", r"m\[1\]\[1\]: '1e5' is text in YAML 1.1"),
+        ("m: [1, 2]", "m: must be an array of n x 2 numbers, got 2"),
+        ("m: []", "m: must be an array of n x 2 numbers, got 0"),
+        ("m: 4.0", "m: must be an array of n x 2 numbers, got a single number"),
+        ("m: {a: 1}", "m: must be a number"),
+    ],
+)
+def test_an_array_that_is_not_acceptable_is_refused_with_its_place(section_of, text, message):
+    with pytest.raises(FileError, match=message):
+        section_of(text).array("m", (None, 2))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "model.yaml: is empty; a mapping of keys to values is accepted"),
+        ("- 1", "holds list at its top level"),
+        ("a: [1, 2", "line [12], column"),
+        ("a: 1\nb: 2\na: 3", "line 3, column 1: key 'a' is given twice"),
+        ("a: !!python/object:os.system {}", "could not determine a constructor"),
+        ("a: \x07", "is not YAML"),
+    ],
+)
+def test_text_that_is_no_mapping_is_refused_with_its_place(section_of, text, message):
+    with pytest.raises(FileError, match=message):
+        section_of(text)
+
+
+def test_a_file_that_cannot_be_read_is_refused_with_its_name(tmp_path):
+    with pytest.raises(FileError, match=r"absent\.yaml: cannot be read: No such file"):
+        read_yaml(tmp_path / "absent.yaml")
+    with pytest.raises(FileError, match="cannot be read: Is a directory"):
+        read_yaml(tmp_path)
+    (tmp_path / "latin.yaml").write_bytes(b"name: caf\xe9")
+    with pytest.raises(FileError, match=r"latin\.yaml: is not UTF-8"):
+        read_yaml(tmp_path / "latin.yaml")
+
+
+def test_an_unknown_key_is_refused_with_those_that_are_known(section_of):
+    section = section_of("outer: {known: 1, knwon: 2}").section("outer")
+    section.number("known")
+    with pytest.raises(FileError, match=r"outer\.knwon: is not known here; accepted are known"):
+        section.finish()
+
+
+def test_the_place_of_an_error_in_nested_sections_is_named(section_of):
+    first, second = section_of("points: [{x: 1}, {x: two}]").sections("points")
+    assert first.number("x") == 1.0
+    with pytest.raises(FileError, match=r"points\[1\]\.x: must be a number, got 'two'"):
+        second.number("x")
+
+
+@given(
+    st.lists(st.floats(allow_nan=False, allow_infinity=False, width=64), min_size=1, max_size=20)
+)
+def test_numbers_written_and_read_back_are_the_same_bit_for_bit(tmp_path_factory, numbers):
+    path = tmp_path_factory.mktemp("yaml") / "numbers.yaml"
+    write_yaml(path, {"numbers": np.array(numbers)})
+    read = read_yaml(path).array("numbers", (None,))
+    assert read.tobytes() == np.array(numbers).tobytes()
+
+
+def test_a_file_that_cannot_be_written_leaves_the_old_one_and_no_litter(tmp_path):
+    folder = tmp_path / "models"
+    folder.mkdir()
+    target = folder / "model.yaml"
+    target.mkdir()  # a folder cannot be replaced by a file
+    with pytest.raises(FileError, match=r"model\.yaml: cannot be written"):
+        write_atomically(target, "text")
+    assert [path.name for path in folder.iterdir()] == ["model.yaml"]
+    with pytest.raises(FileError, match="No such file or directory"):
+        write_atomically(tmp_path / "absent" / "model.yaml", "text")
+
+
+def test_a_written_file_has_the_permissions_that_the_umask_leaves(tmp_path):
+    before = os.umask(0o027)
+    try:
+        write_atomically(tmp_path / "model.yaml", "text")
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / "model.yaml").stat().st_mode) == 0o640
+
+
+def test_the_header_is_a_comment_at_the_top(tmp_path):
+    write_yaml(tmp_path / "model.yaml", {"a": 1.0}, header="made by\n\nhand")
+    assert (tmp_path / "model.yaml").read_text() == "# made by\n#\n# hand\na: 1.0\n"
