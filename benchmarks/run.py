@@ -2,7 +2,8 @@
 
 Usage: python benchmarks/run.py [NAME...]
 
-Each `bench_NAME.py` beside this file is a program of its own that prints Markdown. Without names
+Each `bench_NAME.py` beside this file is a program of its own that prints Markdown (headings
+from ### down). Without names
 all are run; the sections of those that are not run stay as they were. The exit code is 1 when a
 benchmark failed; its section then keeps its last good result.
 """
