@@ -1,0 +1,101 @@
+"""Support points: the exact limit surface of a body on finitely many contacts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from limit_surface_ros.checks import as_floats, as_positive
+from limit_surface_ros.errors import GeometryError, RangeError, ShapeError
+from limit_surface_ros.surface.scaled_surface import ScaledSurface
+from limit_surface_ros.surface.scaling import Scaling
+
+if TYPE_CHECKING:
+    from limit_surface_ros.checks import Floats
+
+# A support point slower than this, relative to the fastest motion it could have, is at rest.
+_REST = 1e-14
+
+
+@dataclass(frozen=True, eq=False)
+class PointContacts(ScaledSurface):
+    """The limit surface of support points with isotropic Coulomb friction.
+
+    A point p_k that moves with w_k resists with m_k w_k / |w_k|; a point at rest resists with any
+    force up to m_k, which makes a facet of the surface. See Goyal, Ruina and Papadopoulos (1991),
+    doi:10.1016/0043-1648(91)90104-3.
+
+    Attributes:
+        points: Support points about the reference point [m], shape (n, 2).
+        friction_limits: Friction each point can give, mu_k N_k [N], shape (n,).
+        scaling: Characteristic length [m] and friction force [N].
+
+    Raises:
+        ShapeError: The shapes do not fit.
+        NotFiniteError: A number is NaN or infinite.
+        RangeError: A friction limit is negative.
+        GeometryError: There is no point, or no point carries any friction.
+    """
+
+    kind: ClassVar[str] = "point_contacts"
+
+    points: Floats
+    friction_limits: Floats
+    scaling: Scaling = field(default_factory=Scaling)
+    _points: Floats = field(init=False, repr=False)
+    _limits: Floats = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the arrays and scale them."""
+        points = as_floats("points", self.points).copy()
+        limits = as_floats("friction_limits", self.friction_limits).copy()
+        if points.size == 0:
+            raise GeometryError("a body needs at least one support point, got none")
+        if points.ndim != 2 or points.shape[1] != 2:
+            raise ShapeError(f"points must have shape (n, 2), got {points.shape}")
+        if limits.shape != (len(points),):
+            raise ShapeError(
+                f"friction_limits must have shape ({len(points)},), one for each point, "
+                f"got {limits.shape}"
+            )
+        if not (limits >= 0.0).all():
+            raise RangeError(f"friction_limits must not be negative, got {limits.min()}")
+        if not limits.any():
+            raise GeometryError("no support point carries friction: every limit is 0")
+        for array in (points, limits):
+            array.setflags(write=False)
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "friction_limits", limits)
+        object.__setattr__(self, "_points", points / self.scaling.characteristic_length)
+        object.__setattr__(self, "_limits", limits / self.scaling.friction_force)
+
+    def with_friction_force(self, friction_force: float) -> PointContacts:
+        """Return the same body under another weight; see `ScaledSurface`.
+
+        Every friction limit grows in the ratio of the friction force scales.
+        """
+        force = as_positive("friction_force", friction_force)
+        return PointContacts(
+            self.points,
+            self.friction_limits * (force / self.scaling.friction_force),
+            replace(self.scaling, friction_force=force),
+        )
+
+    def _loads(self, twists: Floats) -> Floats:
+        vx, vy, omega = (component[:, np.newaxis] for component in twists)
+        x, y = self._points.T
+        wx = vx - omega * y
+        wy = vy + omega * x
+        speed = np.hypot(wx, wy)
+        rest = speed <= _REST * (np.abs(vx) + np.abs(vy) + np.abs(omega) * np.hypot(x, y))
+        grip = np.where(rest, 0.0, self._limits / np.where(rest, 1.0, speed))
+        fx, fy = grip * wx, grip * wy
+        return np.array([fx.sum(axis=1), fy.sum(axis=1), fy @ x - fx @ y])
+
+    def _load_factors(self, loads: Floats) -> Floats:
+        raise NotImplementedError
+
+    def _twists(self, loads: Floats) -> Floats:
+        raise NotImplementedError

@@ -1,0 +1,79 @@
+"""Positive semidefinite 3x3 matrices: validation, and factors that keep small values exact."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from limit_surface_ros.checks import as_floats
+from limit_surface_ros.errors import MatrixError, ShapeError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from limit_surface_ros.checks import Floats
+
+# Relative asymmetry and negativity that rounding may leave in a matrix.
+_TOLERANCE = 1e-10
+# Relative pivot below which a matrix has no further rank.
+_RANK_TOLERANCE = 8 * np.finfo(np.float64).eps
+
+
+def as_psd_matrices(name: str, matrices: ArrayLike) -> Floats:
+    """Return `matrices` as a read-only float64 array (k, 3, 3) of PSD matrices, k at least 1.
+
+    Args:
+        name: What one matrix is, for the error.
+        matrices: Shape (k, 3, 3).
+
+    Raises:
+        ShapeError: The shape is another.
+        NotFiniteError: An element is NaN or infinite.
+        MatrixError: A matrix is zero, not symmetric or not positive semidefinite.
+    """
+    array = as_floats(name, matrices)
+    if array.ndim != 3 or array.shape[1:] != (3, 3) or len(array) == 0:
+        raise ShapeError(f"{name} must have shape (k, 3, 3) with k >= 1, got {array.shape}")
+    for index, matrix in enumerate(array):
+        size = np.abs(matrix).max()
+        if size == 0.0:
+            raise MatrixError(f"{name} {index} is zero: every term must resist some load")
+        if np.abs(matrix - matrix.T).max() > _TOLERANCE * size:
+            raise MatrixError(f"{name} {index} must be symmetric, got {matrix.tolist()}")
+        lowest = np.linalg.eigvalsh(matrix / size)[0]
+        if lowest < -_TOLERANCE:
+            raise MatrixError(
+                f"{name} {index} must be positive semidefinite, "
+                f"its lowest eigenvalue is {lowest * size:.6g}"
+            )
+    result: Floats = array.copy()
+    result.setflags(write=False)
+    return result
+
+
+def root_of(matrix: Floats) -> Floats:
+    """Return R with R'R = `matrix`, by Cholesky's method with pivots.
+
+    |R u|^2 is never negative and keeps twice the digits of u'Au where that is small; rows of R
+    are zero beyond the matrix's rank.
+
+    Args:
+        matrix: Positive semidefinite, shape (3, 3).
+
+    Returns:
+        Shape (3, 3); a column permutation of an upper triangle.
+    """
+    rest = 0.5 * (matrix + matrix.T)
+    diagonal = np.diagonal(rest).copy()
+    root = np.zeros((3, 3))
+    free = [i for i in range(3) if diagonal[i] > 0.0]
+    for row in range(3):
+        pivots = {i: rest[i, i] / diagonal[i] for i in free}
+        pivot = max(pivots, key=pivots.__getitem__, default=-1)
+        if pivot < 0 or pivots[pivot] <= _RANK_TOLERANCE:
+            break
+        free.remove(pivot)
+        root[row, [pivot, *free]] = rest[pivot, [pivot, *free]] / np.sqrt(rest[pivot, pivot])
+        rest = rest - np.outer(root[row], root[row])
+    return root

@@ -1,0 +1,151 @@
+"""What all kinds of surface share: validation, scaled variables, one vector or many.
+
+A kind implements its three maps on *scaled columns*: arrays of shape (3, m), contiguous by
+component, each column of size about one. This base takes what callers pass, of shape (..., 3) in
+physical units, to such columns in blocks that fit the processor's cache, and back.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, ClassVar, TypeVar
+
+import numpy as np
+
+from limit_surface_ros.checks import as_directions, as_positive, as_vectors
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from numpy.typing import ArrayLike
+
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.scaling import Scaling
+
+# Columns per block: a few dozen temporaries of this length stay in the second-level cache.
+BLOCK = 4096
+
+Self = TypeVar("Self", bound="ScaledSurface")
+
+
+class ScaledSurface(ABC):
+    """A limit surface defined in scaled variables; see `surface.protocol.LimitSurface`."""
+
+    kind: ClassVar[str]
+    scaling: Scaling
+
+    @abstractmethod
+    def with_friction_force(self: Self, friction_force: float) -> Self:
+        """Return the same body under another weight.
+
+        Args:
+            friction_force: The new friction force scale F0 [N]; every limit grows with it.
+
+        Raises:
+            RangeError: The force is not a finite number above zero.
+        """
+
+    @abstractmethod
+    def _load_factors(self, loads: Floats) -> Floats:
+        """Map scaled loads (3, m) to load factors (m,); 0 for a zero column."""
+
+    @abstractmethod
+    def _twists(self, loads: Floats) -> Floats:
+        """Map scaled loads (3, m), none zero, to unit scaled twists (3, m)."""
+
+    @abstractmethod
+    def _loads(self, twists: Floats) -> Floats:
+        """Map scaled twists (3, m), none zero, to scaled loads (3, m) on the surface."""
+
+    def scaled(self: Self, factor: float) -> Self:
+        """Return the surface with every wrench on it multiplied by `factor`.
+
+        The load factor of a wrench becomes 1 / factor times what it was, the twists stay.
+
+        Raises:
+            RangeError: The factor is not a finite number above zero.
+        """
+        factor = as_positive("factor", factor)
+        return self.with_friction_force(self.scaling.friction_force * factor)
+
+    def load_factor(self, wrench: ArrayLike) -> Floats:
+        """How far out a wrench lies: the s with wrench / s on the surface.
+
+        Below 1 the body sticks, from 1 on it slides; 0 for a zero wrench.
+
+        Args:
+            wrench: Shape (..., 3), (fx, fy, tau_z) in [N, N, N m].
+
+        Returns:
+            Shape (...).
+
+        Raises:
+            ShapeError: The last axis does not hold three components.
+            NotFiniteError: A component is NaN or infinite.
+        """
+        array = as_vectors("wrench", wrench)
+        factors = np.empty(array.size // 3)
+        for block, columns, sizes in _scaled_blocks(array, self.scaling.wrench_unit):
+            np.multiply(self._load_factors(columns), sizes, out=factors[block])
+        return factors.reshape(array.shape[:-1])[()]
+
+    def twist_of_wrench(self, wrench: ArrayLike) -> Floats:
+        """Direction of the incipient motion: the outward normal where the wrench's ray leaves.
+
+        Args:
+            wrench: Shape (..., 3), (fx, fy, tau_z) in [N, N, N m], not zero; only its direction
+                matters.
+
+        Returns:
+            Shape (..., 3) twists (vx, vy, omega_z) of unit norm in scaled variables.
+
+        Raises:
+            ShapeError: The last axis does not hold three components.
+            NotFiniteError: A component is NaN or infinite.
+            ZeroVectorError: A wrench is zero.
+        """
+        array = as_directions("wrench", wrench)
+        return _mapped(array, self.scaling.wrench_unit, self._twists, self.scaling.twist_unit)
+
+    def wrench_of_twist(self, twist: ArrayLike) -> Floats:
+        """Load of maximum dissipation: the wrench on the surface with the most power.
+
+        Args:
+            twist: Shape (..., 3), (vx, vy, omega_z) in [m/s, m/s, rad/s], not zero; only its
+                direction matters.
+
+        Returns:
+            Shape (..., 3) wrenches (fx, fy, tau_z) on the surface, in [N, N, N m].
+
+        Raises:
+            ShapeError: The last axis does not hold three components.
+            NotFiniteError: A component is NaN or infinite.
+            ZeroVectorError: A twist is zero.
+        """
+        array = as_directions("twist", twist)
+        return _mapped(array, self.scaling.twist_unit, self._loads, self.scaling.wrench_unit)
+
+
+def _mapped(
+    array: Floats, unit_in: Floats, kernel: Callable[[Floats], Floats], unit_out: Floats
+) -> Floats:
+    """Map vectors (..., 3) through a kernel on scaled columns."""
+    result = np.empty((array.size // 3, 3))
+    for block, columns, _ in _scaled_blocks(array, unit_in):
+        np.multiply(kernel(columns).T, unit_out, out=result[block])
+    return result.reshape(array.shape)
+
+
+def _scaled_blocks(array: Floats, unit: Floats) -> Iterator[tuple[slice, Floats, Floats]]:
+    """Yield blocks of vectors (..., 3) as a slice, scaled columns of size one, and their sizes.
+
+    The size is taken out first, so that no load overflows or vanishes on the way.
+    """
+    rows = array.reshape(-1, 3)
+    for start in range(0, len(rows), BLOCK):
+        block = slice(start, start + BLOCK)
+        columns = np.divide(rows[block].T, 1.0, order="C")
+        sizes = np.abs(columns).max(axis=0)
+        columns /= np.where(sizes > 0.0, sizes, 1.0)
+        columns /= unit[:, np.newaxis]
+        yield block, columns, sizes
