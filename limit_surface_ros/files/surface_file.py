@@ -1,0 +1,148 @@
+"""Surface model files: a limit surface with its name, frame and history, in YAML.
+
+Keys: `schema: 1`, `name`, `kind`, `frame_id`, `reference_point` [m], `characteristic_length` [m],
+`friction_force` [N], `normal_force` [N] (optional), `fit` (how the model came about; free), and
+last the numbers that define the kind: `terms`, `exponents` and `matrices` of a power_sum, `points`
+and `friction_limits` of point_contacts. Because these come last and are counted, a file cut short
+anywhere is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from limit_surface_ros.checks import as_positive
+from limit_surface_ros.errors import RangeError
+from limit_surface_ros.files.yaml_reader import Section, place_errors, read_yaml, write_yaml
+from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.scaling import Scaling
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from limit_surface_ros.surface.protocol import LimitSurface
+
+SCHEMA = 1
+
+
+@dataclass(frozen=True)
+class SurfaceModel:
+    """A limit surface as it is stored and served.
+
+    Attributes:
+        name: By which services ask for it.
+        surface: The surface itself, in physical units.
+        frame_id: Frame in which its wrenches and twists are given.
+        reference_point: (x, y) [m] in that frame, about which moments are taken.
+        normal_force: Normal force [N] at which the surface holds, if it is known; another weight
+            scales the surface.
+        fit: How the model came about: objective, data, errors, date, version. Plain values.
+
+    Raises:
+        RangeError: The name or the frame is empty, or the normal force not above zero.
+    """
+
+    name: str
+    surface: LimitSurface
+    frame_id: str = "object"
+    reference_point: tuple[float, float] = (0.0, 0.0)
+    normal_force: float | None = None
+    fit: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check what the surface itself does not know."""
+        for key in ("name", "frame_id"):
+            if not getattr(self, key).strip():
+                raise RangeError(f"{key} must not be empty")
+        if self.normal_force is not None:
+            as_positive("normal_force", self.normal_force)
+
+
+def _counted_matrices(section: Section) -> Any:
+    terms = section.integer("terms", at_least=1)
+    return section.array("matrices", (terms, 3, 3))
+
+
+def _read_power_sum(section: Section, scaling: Scaling) -> LimitSurface:
+    matrices = _counted_matrices(section)
+    return PowerSum(matrices, section.array("exponents", (len(matrices),)), scaling)
+
+
+def _read_point_contacts(section: Section, scaling: Scaling) -> LimitSurface:
+    points = section.array("points", (None, 2))
+    return PointContacts(points, section.array("friction_limits", (len(points),)), scaling)
+
+
+_READERS: dict[str, Callable[[Section, Scaling], LimitSurface]] = {
+    "power_sum": _read_power_sum,
+    "point_contacts": _read_point_contacts,
+}
+# What defines each kind, in the order of the file.
+_DEFINING = {
+    "power_sum": ("exponents", "matrices"),
+    "point_contacts": ("points", "friction_limits"),
+}
+
+
+def read_surface_model(path: str | Path) -> SurfaceModel:
+    """Read a surface model.
+
+    Raises:
+        FileError: The file is no valid surface model; the message names file, key, what was found
+            and what is accepted.
+    """
+    section = read_yaml(path)
+    section.choice("schema", [SCHEMA])
+    kind = section.choice("kind", list(_READERS))
+    scaling = Scaling(
+        section.number("characteristic_length", above=0.0),
+        section.number("friction_force", above=0.0),
+    )
+    reference_point = section.array("reference_point", (2,), (0.0, 0.0))
+    history = section.section("fit", {})
+    surface = place_errors(section, kind, lambda: _READERS[kind](section, scaling))
+    model = SurfaceModel(
+        name=section.text("name"),
+        surface=surface,
+        frame_id=section.text("frame_id"),
+        reference_point=(float(reference_point[0]), float(reference_point[1])),
+        normal_force=section.number("normal_force", None, above=0.0),
+        fit=history.values,
+    )
+    section.finish()
+    return model
+
+
+def write_surface_model(model: SurfaceModel, path: str | Path, header: str = "") -> None:
+    """Write a surface model, atomically; read back it gives the same numbers bit for bit.
+
+    Args:
+        model: The model.
+        path: The file, in a folder that exists.
+        header: Lines of a comment at the top, such as the command that made the model.
+
+    Raises:
+        FileError: The file cannot be written.
+    """
+    surface = model.surface
+    defining = {key: getattr(surface, key) for key in _DEFINING[surface.kind]}
+    values: dict[str, Any] = {
+        "schema": SCHEMA,
+        "name": model.name,
+        "kind": surface.kind,
+        "frame_id": model.frame_id,
+        "reference_point": list(model.reference_point),
+        "characteristic_length": surface.scaling.characteristic_length,
+        "friction_force": surface.scaling.friction_force,
+    }
+    if model.normal_force is not None:
+        values["normal_force"] = model.normal_force
+    if model.fit:
+        values["fit"] = dict(model.fit)
+    if "matrices" in defining:
+        values["terms"] = len(defining["matrices"])
+    write_yaml(path, values | defining, header)
