@@ -23,8 +23,10 @@ def random_matrices(terms):
 
 def surfaces():
     scaling = Scaling(0.1 / 3, 7.0 / 3)
-    yield PowerSum(random_matrices(3), [1.0, 2 / 3, 1 / 3], scaling)
-    yield PointContacts(RNG.normal(size=(3, 2)), [0.5, 0.1, 1 / 3], scaling)
+    return [
+        PowerSum(random_matrices(3), [1.0, 2 / 3, 1 / 3], scaling),
+        PointContacts(RNG.normal(size=(3, 2)), [0.5, 0.1, 1 / 3], scaling),
+    ]
 
 
 @pytest.mark.parametrize("surface", surfaces(), ids=lambda surface: surface.kind)
@@ -42,11 +44,8 @@ def test_a_model_written_and_read_back_is_the_same_bit_for_bit(tmp_path, surface
         model.fit,
     )
     assert read.surface.scaling == surface.scaling
-    wrenches = RNG.normal(size=(20, 3))
-    assert np.array_equal(read.surface.load_factor(wrenches), surface.load_factor(wrenches))
-    assert np.array_equal(
-        read.surface.wrench_of_twist(wrenches), surface.wrench_of_twist(wrenches)
-    )
+    twists = RNG.normal(size=(20, 3))
+    assert np.array_equal(read.surface.wrench_of_twist(twists), surface.wrench_of_twist(twists))
 
 
 @pytest.mark.parametrize("surface", surfaces(), ids=lambda surface: surface.kind)
@@ -69,9 +68,13 @@ def test_a_file_cut_short_anywhere_is_refused(tmp_path, surface):
         ("name: part", "name: 7", "name: must be a text that is not empty, got 7"),
         ("frame_id: object", "frame_id: ''", "frame_id: must be a text"),
         ("friction_force: 1.0", "friction_force: -1.0", "friction_force: must be above 0.0"),
-        ("friction_force: 1.0", "friction_force: 1e3", "'1e3' is text in YAML 1.1"),
+        (
+            "friction_force: 1.0",
+            "friction_force: 1e3",
+            "friction_force: '1e3' is text in YAML 1.1",
+        ),
         ("terms: 1", "terms: 2", "matrices: must be an array of 2 x 3 x 3 numbers"),
-        ("exponents:\n", "exponents: [1.0, 0.5]\nx:\n", "exponents: must be an array of 1"),
+        ("exponents: [1.0]", "exponents: [1.0, 0.5]", "exponents: must be an array of 1"),
         ("exponents: [1.0]", "exponents: [1.5]", "power_sum: .*exponent"),
         ("[0.0, 0.0, 1.0]", "[0.0, 0.0, -1.0]", "power_sum: .*semidefinite"),
         ("[0.0, 0.0, 1.0]", "[0.0, 0.0, .nan]", r"matrices\[0\]\[2\]\[2\]: must be finite"),
