@@ -1,0 +1,175 @@
+"""Decay models and their files.
+
+schema: 1
+kind: exponential_sum
+name: hockey_stick
+rates: [[-2.05, 0.51], ...]        # [re, im] [1/s], one of each conjugate pair (im >= 0)
+coefficients: [[0.31, -0.2], ...]  # x(t) = Re sum c exp(lambda t)
+time_span: [0.0, 6.0]              # [s], where the error was measured
+norm: inf
+max_error: 0.0282                  # in the unit of x
+system:                            # optional: the delay system whose roots the rates are
+  delays: [0.0, 1.0]
+  strengths: [-1.0, 1.0]
+  edges: [0.0, 1.0, ...]           # optional: the distributed feedback
+  legendre: [[...], ...]           # one row for each cell
+fit: {...}                         # optional: how the model came about
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from limit_surface_ros.decay.delay_system import DelaySystem
+from limit_surface_ros.decay.exponential_sum import ExponentialSum
+from limit_surface_ros.decay.pieces import PiecewisePolynomial
+from limit_surface_ros.errors import RangeError
+from limit_surface_ros.files.yaml_reader import Section, place_errors, read_yaml, write_yaml
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from limit_surface_ros.checks import Floats
+
+SCHEMA = 1
+KIND = "exponential_sum"
+
+
+@dataclass(frozen=True)
+class DecayModel:
+    """A sum of exponentials with its name, its error and its origin.
+
+    Attributes:
+        name: By which programs ask for it.
+        sum: The function x(t); it decays.
+        time_span: Start and end [s] of the interval on which `max_error` holds.
+        norm: What the coefficients minimise: "inf", "2", "1" or a name of the analyst's own.
+        max_error: Largest |x - response| on the time span, in the unit of x.
+        system: The delay system whose roots the rates are, if they come from one.
+        fit: How the model came about, as plain values for the file.
+
+    Raises:
+        RangeError: The name is empty, the span is not 0 <= start < end, the error is negative, or
+            the sum does not decay.
+    """
+
+    name: str
+    sum: ExponentialSum
+    time_span: tuple[float, float]
+    norm: str
+    max_error: float
+    system: DelaySystem | None = None
+    fit: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check what the sum itself has not checked."""
+        if not self.name.strip():
+            raise RangeError("a decay model needs a name")
+        start, end = (float(t) for t in self.time_span)
+        if not 0.0 <= start < end < float("inf"):
+            raise RangeError(f"time_span must be 0 <= start < end, got {start} and {end}")
+        if not 0.0 <= self.max_error < float("inf"):
+            raise RangeError(f"max_error must be finite and at least 0, got {self.max_error}")
+        if not self.sum.slowest_rate < 0.0:
+            raise RangeError(
+                f"a decay model must decay: its right-most rate has the real part "
+                f"{self.sum.slowest_rate:g}, which must be below 0"
+            )
+        object.__setattr__(self, "time_span", (start, end))
+        object.__setattr__(self, "max_error", float(self.max_error))
+
+
+def read_decay_model(path: str | Path) -> DecayModel:
+    """Read a decay model.
+
+    Raises:
+        FileError: The file cannot be read or is no valid decay model; the message names the file,
+            the key, what was found and what is accepted.
+    """
+    top = read_yaml(path)
+    top.choice("schema", [SCHEMA])
+    top.choice("kind", [KIND])
+    name = top.text("name")
+    rates, coefficients = (_complexes(top, key) for key in ("rates", "coefficients"))
+    span = top.array("time_span", (2,))
+    norm = top.text("norm")
+    max_error = top.number("max_error", at_least=0.0)
+    system = _read_system(top.section("system")) if "system" in top else top.raw("system", None)
+    fit = dict(top.section("fit").values) if "fit" in top else top.raw("fit", None) or {}
+    top.finish()
+    x = place_errors(top, "rates", lambda: ExponentialSum(rates, coefficients))
+    model: DecayModel = place_errors(
+        top,
+        "rates" if x.slowest_rate >= 0.0 else "time_span",
+        lambda: DecayModel(name, x, (span[0], span[1]), norm, max_error, system, fit),
+    )
+    return model
+
+
+def write_decay_model(model: DecayModel, path: str | Path, header: str = "") -> None:
+    """Write a decay model, atomically; read back it gives the same numbers bit for bit.
+
+    Args:
+        model: The model.
+        path: The file, in a folder that exists.
+        header: Lines of a comment at the top, such as the command that made the file.
+
+    Raises:
+        FileError: The file cannot be written.
+    """
+    values: dict[str, Any] = {
+        "schema": SCHEMA,
+        "kind": KIND,
+        "name": model.name,
+        "rates": _rows(model.sum.rates),
+        "coefficients": _rows(model.sum.coefficients),
+        "time_span": list(model.time_span),
+        "norm": model.norm,
+        "max_error": model.max_error,
+    }
+    if model.system is not None:
+        values["system"] = _system_values(model.system)
+    if model.fit:
+        values["fit"] = dict(model.fit)
+    write_yaml(path, values, header)
+
+
+def _complexes(section: Section, key: str) -> Any:
+    rows: Floats = section.array(key, (None, 2))
+    # A view, and not re + 1j im, which would lose the sign of a zero.
+    return np.ascontiguousarray(rows).view(np.complex128)[:, 0]
+
+
+def _rows(values: Any) -> Floats:
+    return np.stack([values.real, values.imag], axis=-1)
+
+
+def _read_system(section: Section) -> DelaySystem:
+    empty = np.zeros(0)
+    delays = section.array("delays", (None,), empty)
+    strengths = section.array("strengths", (None,), empty)
+    edges = section.array("edges", (None,), None)
+    series = section.array("legendre", (None, None), None)
+    section.finish()
+    if (edges is None) != (series is None):
+        raise section.error("edges", "edges and legendre belong together: give both or none")
+    pieces = None
+    if edges is not None:
+        pieces = place_errors(section, "edges", lambda: PiecewisePolynomial(edges, series))
+    system: DelaySystem = place_errors(
+        section, "delays", lambda: DelaySystem(delays, strengths, pieces)
+    )
+    return system
+
+
+def _system_values(system: DelaySystem) -> dict[str, Any]:
+    values: dict[str, Any] = {}
+    if len(system.delays):
+        values |= {"delays": system.delays, "strengths": system.strengths}
+    if system.pieces is not None:
+        values |= {"edges": system.pieces.edges, "legendre": system.pieces.coefficients}
+    return values
