@@ -257,8 +257,12 @@ def place_errors(section: Section, key: str, build: Callable[[], Any]) -> Any:
         raise section.error(key, str(error)) from error
 
 
-def write_atomically(path: str | Path, text: str) -> None:
-    """Write a text file in one step: whoever reads sees all of it or what was there before.
+def write_atomically(path: str | Path, content: str | bytes) -> None:
+    """Write a file in one step: whoever reads sees all of it or what was there before.
+
+    Args:
+        path: The file, in a folder that exists.
+        content: Text, which is written as UTF-8, or bytes.
 
     Raises:
         FileError: The folder is absent or not writable, or the disk is full.
@@ -267,10 +271,10 @@ def write_atomically(path: str | Path, text: str) -> None:
     part: Path | None = None
     try:
         with tempfile.NamedTemporaryFile(
-            "w", encoding="utf-8", dir=path.parent, prefix=f".{path.name}.", delete=False
+            "wb", dir=path.parent, prefix=f".{path.name}.", delete=False
         ) as stream:
             part = Path(stream.name)
-            stream.write(text)
+            stream.write(content.encode() if isinstance(content, str) else content)
             stream.flush()
             os.fsync(stream.fileno())
         # Temporary files are private; a model file is for everybody whom the umask lets in.
