@@ -1,0 +1,140 @@
+"""The virtual environment `.venv`: made, filled, mended, and remade when it does not fit."""
+
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from console import run_logged, say
+
+INTERPRETER = os.path.realpath(sys.executable)
+# The wheels' CMake files name the machine that built them.
+BUILDERS_NUMPY = re.compile(
+    r"/opt/python/cp\d+-cp\d+/lib/python3\.\d+/site-packages/numpy/_core/include"
+)
+BUILDERS_PYTHON = re.compile(r"/opt/python/cp\d+-cp\d+/include/python3\.\d+")
+PATHS_OF_THIS_MACHINE = """
+import sysconfig, numpy
+print(numpy.get_include(), sysconfig.get_paths()["include"], sep="\\n")
+"""
+
+
+class VenvDir:
+    """A virtual environment that remembers what it was filled from.
+
+    Args:
+        root: the repository.
+        system_ros: whether the packages of the system are visible inside.
+    """
+
+    def __init__(self, root: Path, system_ros: bool) -> None:
+        """Name the place; nothing is made yet."""
+        self.root = root
+        self.path = root / ".venv"
+        self.python = self.path / "bin" / "python"
+        self._system_ros = system_ros
+        self._stamps = self.path / "stamps"
+
+    def fill(self, groups: Sequence[str], env: Mapping[str, str], constraints: str = "") -> None:
+        """Bring in the packages of requirements/<group>.txt, making the environment if need be.
+
+        Args:
+            groups: names of requirements files; all of them hold together.
+            env: environment for pip.
+            constraints: further lines for pip, such as versions that the system fixes.
+
+        Raises:
+            SetupError: Python or pip failed.
+        """
+        base = self._key("base")
+        if self._read_stamp("base") != base:
+            self._make(env)
+            self._write_stamp("base", base)
+        keys = {group: self._key(group, constraints) for group in groups}
+        if all(self._read_stamp(group) == key for group, key in keys.items()):
+            return
+        for group in groups:
+            self._remove_stamp(group)
+        self._install(groups, env, constraints)
+        if not self._system_ros:
+            self._mend_cmake_files(env)
+        for group, key in keys.items():
+            self._write_stamp(group, key)
+
+    def _make(self, env: Mapping[str, str]) -> None:
+        if self.path.exists() or self.path.is_symlink():
+            say("replacing .venv: unfinished, or made at another place or by another Python")
+            self._remove_stamp("base")
+            if self.path.is_symlink():
+                self.path.unlink()
+            else:
+                shutil.rmtree(self.path)
+        visible = ["--system-site-packages"] if self._system_ros else []
+        run_logged(
+            [INTERPRETER, "-I", "-m", "venv", *visible, self.path],
+            self.root / "log" / "set-up" / "venv.log",
+            "making .venv",
+            env,
+            self.root,
+        )
+
+    def _install(self, groups: Sequence[str], env: Mapping[str, str], constraints: str) -> None:
+        logs = self.root / "log" / "set-up"
+        files = [part for group in groups for part in ("-r", f"requirements/{group}.txt")]
+        if constraints:
+            path = logs / "constraints.txt"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(constraints, encoding="utf-8")
+            # pip splits nothing here, but reads environment variables in file names: be relative.
+            files += ["-c", str(path.relative_to(self.root))]
+        first = "ros" in groups and not list(self.path.glob("lib/python*/site-packages/rclpy"))
+        size = " (once, about 500 MB of ROS)" if first else ""
+        run_logged(
+            [self.python, "-m", "pip", "install", "--no-input", *files],
+            logs / "pip.log",
+            f"installing requirements of {', '.join(groups)}{size}",
+            env,
+            self.root,
+        )
+
+    def _mend_cmake_files(self, env: Mapping[str, str]) -> None:
+        """Point exported CMake targets at the headers of this machine; nothing if they do."""
+        answer = subprocess.run(
+            [self.python, "-c", PATHS_OF_THIS_MACHINE],
+            env=dict(env),
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout
+        numpy_include, python_include = answer.splitlines()
+        for path in self.path.glob("share/*/cmake/*.cmake"):
+            found = path.read_text(encoding="utf-8")
+            mended = BUILDERS_NUMPY.sub(lambda _: numpy_include, found)
+            mended = BUILDERS_PYTHON.sub(lambda _: python_include, mended)
+            if mended != found:
+                path.write_text(mended, encoding="utf-8")
+
+    def _key(self, group: str, constraints: str = "") -> str:
+        """Return what an up-to-date stamp of `group` holds."""
+        requirements = self.root / "requirements" / f"{group}.txt"
+        parts = [str(self.path), INTERPRETER, str(sys.version_info[:2]), str(self._system_ros)]
+        if requirements.exists():
+            parts += [requirements.read_text(encoding="utf-8"), constraints]
+        return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+
+    def _read_stamp(self, name: str) -> str:
+        path = self._stamps / name
+        return path.read_text(encoding="utf-8") if path.is_file() and self.python.exists() else ""
+
+    def _write_stamp(self, name: str, key: str) -> None:
+        self._stamps.mkdir(exist_ok=True)
+        draft = self._stamps / f".{name}"
+        draft.write_text(key, encoding="utf-8")
+        draft.replace(self._stamps / name)
+
+    def _remove_stamp(self, name: str) -> None:
+        (self._stamps / name).unlink(missing_ok=True)
