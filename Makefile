@@ -1,0 +1,34 @@
+# Every target sets up what it needs first: see scripts/with_ros.
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+.PHONY: help demo run test lint bench clean
+
+PROGRAMS := install/limit_surface_ros/lib/limit_surface_ros
+SHARE := install/limit_surface_ros/share/limit_surface_ros
+# PYTHON=python3.12 make ... chooses the interpreter; ARGS="..." goes to the program that is run.
+ARGS ?=
+
+help: ## Show what can be made
+	@echo "limit_surface_ros: make TARGET [ARGS=\"...\"] [PYTHON=python3.12]"
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|'
+
+demo: ## Start the node, call its services, print a table (ARGS go to demo)
+	@scripts/with_ros --isolated -- python3 $(PROGRAMS)/demo $(ARGS)
+
+run: ## Serve the models of config/ until Ctrl-C (ARGS go to limit_surface_node)
+	@scripts/with_ros --foreground -- python3 $(PROGRAMS)/limit_surface_node \
+	    --ros-args --params-file $(SHARE)/config/limit_surface.yaml $(ARGS)
+
+test: ## Run the tests against the built packages (ARGS go to pytest: ARGS="-k name")
+	@scripts/with_ros --with test --with extras --isolated -- python3 scripts/run_pytest.py $(ARGS)
+
+lint: ## Check style, types and package descriptions
+	@scripts/with_ros --with lint -- scripts/lint
+
+bench: ## Measure against named peers, into benchmarks/RESULTS.md (ARGS name some of them)
+	@scripts/with_ros --with bench -- python3 benchmarks/run.py $(ARGS)
+
+clean: ## Remove everything that was installed, built or logged here
+	@rm -rf .venv build install log .mypy_cache .ruff_cache .hypothesis
+	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
+	@echo "removed .venv, build, install, log and caches"
