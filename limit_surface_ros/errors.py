@@ -89,6 +89,12 @@ class UnstableError(LimitSurfaceError, ArithmeticError):
     code = "BAD_MODEL"
 
 
+class NoOnsetError(LimitSurfaceError, ValueError):
+    """A decay model starts at zero, so that it cannot be scaled to an onset."""
+
+    code = "BAD_MODEL"
+
+
 class MissingExtraError(LimitSurfaceError, ImportError):
     """An optional library is absent; the message names the extra that brings it."""
 
