@@ -13,6 +13,7 @@ EXTRAS = {
     "bags": ["rosbags"],
     "cluster": ["dask", "distributed"],
     "peers": ["cvxpy"],
+    "docs": ["sphinx", "myst-parser", "furo"],
 }
 
 # Each program's name and the module whose main() it runs.
