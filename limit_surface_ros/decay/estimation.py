@@ -102,6 +102,7 @@ class CoefficientEstimator:
         self._options = options
         self._prior_root = _information_root(model, options)
         self._last_time = -math.inf
+        self._outliers_in_a_row = 0
         self._forget_all()
 
     def add(self, time: float, value: float) -> bool:
@@ -174,7 +175,7 @@ class CoefficientEstimator:
         rows[size:-1, :size] = math.sqrt(1.0 - kept) * self._prior_root
         rows[-1, :size] = row / self._options.noise
         rows[-1, size] = departure / self._options.noise
-        triangle = np.linalg.qr(rows, mode="r")
+        triangle = _triangular(rows)
         self._root, self._departure = triangle[:size, :size], triangle[:size, size]
         change = np.linalg.solve(self._root, self._departure)
         self.x = ExponentialSum.from_weights(self._model.rates, self._model.weights + change)
@@ -198,4 +199,11 @@ def _information_root(model: ExponentialSum, options: EstimationOptions) -> Floa
     direction = together / math.sqrt(size2)
     along = alone / math.hypot(alone, math.sqrt(size2))
     root = (np.eye(len(weights)) - (1.0 - along) * np.outer(direction, direction)) / alone
-    return np.linalg.qr(root, mode="r")
+    return _triangular(root)
+
+
+def _triangular(rows: Floats) -> Floats:
+    """Return the upper triangular R with R'R = rows' rows."""
+    # The stubs of numpy give every mode the result of the one that returns Q as well.
+    triangle: Floats = np.linalg.qr(rows, mode="r")  # type: ignore[assignment]
+    return triangle
