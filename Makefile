@@ -1,7 +1,7 @@
 # Every target sets up what it needs first: see scripts/with_ros.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help demo run test lint bench clean
+.PHONY: help demo run test lint docs bench clean
 
 PROGRAMS := install/limit_surface_ros/lib/limit_surface_ros
 SHARE := install/limit_surface_ros/share/limit_surface_ros
@@ -24,6 +24,10 @@ test: ## Run the tests against the built packages (ARGS go to pytest: ARGS="-k n
 
 lint: ## Check style, types and package descriptions
 	@scripts/with_ros --with lint -- scripts/lint
+
+docs: ## Build the documentation into docs/_build/html
+	@scripts/with_ros --with docs -- python3 -m sphinx -W --keep-going -q docs docs/_build/html
+	@echo "open docs/_build/html/index.html"
 
 bench: ## Measure against named peers, into benchmarks/RESULTS.md (ARGS name some of them)
 	@scripts/with_ros --with bench -- python3 benchmarks/run.py $(ARGS)

@@ -13,7 +13,7 @@ EXTRAS = {
     "bags": ["rosbags"],
     "cluster": ["dask", "distributed"],
     "peers": ["cvxpy"],
-    "docs": ["sphinx", "myst-parser", "furo"],
+    "docs": ["sphinx", "myst-parser", "furo", "sphinx-mathjax-offline"],
 }
 
 # Each program's name and the module whose main() it runs.
