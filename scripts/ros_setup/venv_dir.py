@@ -23,6 +23,12 @@ print(numpy.get_include(), sysconfig.get_paths()["include"], sep="\\n")
 """
 
 
+def mend_cmake(text: str, numpy_include: str, python_include: str) -> str:
+    """Return a CMake file with the headers of this machine instead of its builder's."""
+    text = BUILDERS_NUMPY.sub(lambda _: numpy_include, text)
+    return BUILDERS_PYTHON.sub(lambda _: python_include, text)
+
+
 class VenvDir:
     """A virtual environment that remembers what it was filled from.
 
@@ -119,8 +125,7 @@ class VenvDir:
         numpy_include, python_include = answer.splitlines()
         for path in self.path.glob("share/*/cmake/*.cmake"):
             found = path.read_text(encoding="utf-8")
-            mended = BUILDERS_NUMPY.sub(lambda _: numpy_include, found)
-            mended = BUILDERS_PYTHON.sub(lambda _: python_include, mended)
+            mended = mend_cmake(found, numpy_include, python_include)
             if mended != found:
                 path.write_text(mended, encoding="utf-8")
 

@@ -54,7 +54,7 @@ def build(root: Path, python: Path, env: Mapping[str, str]) -> None:
         # Someone ran `colcon build --merge-install` here.
         shutil.rmtree(root / "install")
         shutil.rmtree(root / "build", ignore_errors=True)
-    keys = {package.name: _key(root, package, python) for package in PACKAGES}
+    keys = {package.name: source_digest(root, package, python) for package in PACKAGES}
     stale = [
         package
         for package in PACKAGES
@@ -89,7 +89,7 @@ def add_workspace(root: Path, env: dict[str, str]) -> None:
         add_package(env, root / "install" / package.name)
 
 
-def _key(root: Path, package: Package, python: Path) -> str:
+def source_digest(root: Path, package: Package, python: Path) -> str:
     """Return a digest of the sources and of what else a build depends on."""
     digest = hashlib.sha256(f"{root}\0{python}\0{python.resolve()}".encode())
     for path in _source_files(root, package):
