@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from limit_surface_ros.checks import as_floats, as_positive
 from limit_surface_ros.errors import GeometryError, RangeError, ShapeError
-from limit_surface_ros.surface.scaled_surface import ScaledSurface
+from limit_surface_ros.surface.dissipation import Dissipation
+from limit_surface_ros.surface.dissipation_surface import DissipationSurface
+from limit_surface_ros.surface.dissipation_terms import PointTerms
 from limit_surface_ros.surface.scaling import Scaling
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
 
-# A support point slower than this, relative to the fastest motion it could have, is at rest.
-_REST = 1e-14
+# Elements of one array of points by motions that fit the processor's cache together with others.
+_ELEMENTS = 2**15
 
 
 @dataclass(frozen=True, eq=False)
-class PointContacts(ScaledSurface):
+class PointContacts(DissipationSurface):
     """The limit surface of support points with isotropic Coulomb friction.
 
     A point p_k that moves with w_k resists with m_k w_k / |w_k|; a point at rest resists with any
@@ -44,8 +47,6 @@ class PointContacts(ScaledSurface):
     points: Floats
     friction_limits: Floats
     scaling: Scaling = field(default_factory=Scaling)
-    _points: Floats = field(init=False, repr=False)
-    _limits: Floats = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the arrays and scale them."""
@@ -68,8 +69,6 @@ class PointContacts(ScaledSurface):
             array.setflags(write=False)
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "friction_limits", limits)
-        object.__setattr__(self, "_points", points / self.scaling.characteristic_length)
-        object.__setattr__(self, "_limits", limits / self.scaling.friction_force)
 
     def with_friction_force(self, friction_force: float) -> PointContacts:
         """Return the same body under another weight; see `ScaledSurface`.
@@ -83,19 +82,27 @@ class PointContacts(ScaledSurface):
             replace(self.scaling, friction_force=force),
         )
 
-    def _loads(self, twists: Floats) -> Floats:
-        vx, vy, omega = (component[:, np.newaxis] for component in twists)
-        x, y = self._points.T
-        wx = vx - omega * y
-        wy = vy + omega * x
-        speed = np.hypot(wx, wy)
-        rest = speed <= _REST * (np.abs(vx) + np.abs(vy) + np.abs(omega) * np.hypot(x, y))
-        grip = np.where(rest, 0.0, self._limits / np.where(rest, 1.0, speed))
-        fx, fy = grip * wx, grip * wy
-        return np.array([fx.sum(axis=1), fy.sum(axis=1), fy @ x - fx @ y])
+    def dissipation(self) -> Dissipation:
+        """Return the same surface as a `Dissipation` with one matrix of rank two per point."""
+        return Dissipation(self.scaled_forms, self.scaling)
 
-    def _load_factors(self, loads: Floats) -> Floats:
-        raise NotImplementedError
+    @property
+    def scaled_forms(self) -> Floats:
+        """The matrices m_k^2 J_k' J_k with w_k = J_k v, in scaled variables, shape (k, 3, 3)."""
+        sliding = self.friction_limits > 0.0
+        limits = self.friction_limits[sliding] / self.scaling.friction_force
+        x, y = self.points[sliding].T / self.scaling.characteristic_length
+        zeros, ones = np.zeros_like(x), np.ones_like(x)
+        forms = np.array([[ones, zeros, -y], [zeros, ones, x], [-y, x, x * x + y * y]])
+        return np.asarray(np.moveaxis(forms * limits**2, -1, 0))
 
-    def _twists(self, loads: Floats) -> Floats:
-        raise NotImplementedError
+    @cached_property
+    def _terms(self) -> PointTerms:
+        return PointTerms(
+            self.points / self.scaling.characteristic_length,
+            self.friction_limits / self.scaling.friction_force,
+        )
+
+    @property
+    def _block_columns(self) -> int:
+        return max(16, _ELEMENTS // len(self.points))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.surface.power_sum_scale import log_scales
+from limit_surface_ros.surface.sphere import even_directions
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
@@ -50,12 +51,7 @@ def loads_of_twists(roots: Floats, exponents: Floats, twists: Floats) -> Floats:
 
 def _starts(roots: Floats, exponents: Floats, twists: Floats) -> Floats:
     """Return for each twist the direction of most power among a fixed set."""
-    count = 512
-    z = (2.0 * np.arange(count) + 1.0) / count - 1.0
-    angle = np.pi * (1.0 + np.sqrt(5.0)) * np.arange(count)
-    radius = np.sqrt(1.0 - z * z)
-    directions = np.array([radius * np.cos(angle), radius * np.sin(angle), z])
-    candidates = _on_surface(roots, exponents, directions)
+    candidates = _on_surface(roots, exponents, even_directions(512).T)
     return candidates[:, np.argmax(candidates.T @ twists, axis=0)]
 
 

@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.surface.scaling import Scaling
 
-# Columns per block: a few dozen temporaries of this length stay in the second-level cache.
-BLOCK = 4096
-
 Self = TypeVar("Self", bound="ScaledSurface")
 
 
@@ -57,6 +54,11 @@ class ScaledSurface(ABC):
     def _loads(self, twists: Floats) -> Floats:
         """Map scaled twists (3, m), none zero, to scaled loads (3, m) on the surface."""
 
+    @property
+    def _block_columns(self) -> int:
+        """Columns per block: a few dozen arrays of this length stay in the processor's cache."""
+        return 4096
+
     def scaled(self: Self, factor: float) -> Self:
         """Return the surface with every wrench on it multiplied by `factor`.
 
@@ -85,7 +87,7 @@ class ScaledSurface(ABC):
         """
         array = as_vectors("wrench", wrench)
         factors = np.empty(array.size // 3)
-        for block, columns, sizes in _scaled_blocks(array, self.scaling.wrench_unit):
+        for block, columns, sizes in self._blocks(array, self.scaling.wrench_unit):
             np.multiply(self._load_factors(columns), sizes, out=factors[block])
         return factors.reshape(array.shape[:-1])[()]
 
@@ -105,7 +107,7 @@ class ScaledSurface(ABC):
             ZeroVectorError: A wrench is zero.
         """
         array = as_directions("wrench", wrench)
-        return _mapped(array, self.scaling.wrench_unit, self._twists, self.scaling.twist_unit)
+        return self._mapped(array, self.scaling.wrench_unit, self._twists, self.scaling.twist_unit)
 
     def wrench_of_twist(self, twist: ArrayLike) -> Floats:
         """Load of maximum dissipation: the wrench on the surface with the most power.
@@ -123,29 +125,28 @@ class ScaledSurface(ABC):
             ZeroVectorError: A twist is zero.
         """
         array = as_directions("twist", twist)
-        return _mapped(array, self.scaling.twist_unit, self._loads, self.scaling.wrench_unit)
+        return self._mapped(array, self.scaling.twist_unit, self._loads, self.scaling.wrench_unit)
 
+    def _mapped(
+        self, array: Floats, unit_in: Floats, kernel: Callable[[Floats], Floats], unit_out: Floats
+    ) -> Floats:
+        """Map vectors (..., 3) through a kernel on scaled columns."""
+        result = np.empty((array.size // 3, 3))
+        for block, columns, _ in self._blocks(array, unit_in):
+            np.multiply(kernel(columns).T, unit_out, out=result[block])
+        return result.reshape(array.shape)
 
-def _mapped(
-    array: Floats, unit_in: Floats, kernel: Callable[[Floats], Floats], unit_out: Floats
-) -> Floats:
-    """Map vectors (..., 3) through a kernel on scaled columns."""
-    result = np.empty((array.size // 3, 3))
-    for block, columns, _ in _scaled_blocks(array, unit_in):
-        np.multiply(kernel(columns).T, unit_out, out=result[block])
-    return result.reshape(array.shape)
+    def _blocks(self, array: Floats, unit: Floats) -> Iterator[tuple[slice, Floats, Floats]]:
+        """Yield blocks of vectors (..., 3): a slice, scaled columns of size one, and their sizes.
 
-
-def _scaled_blocks(array: Floats, unit: Floats) -> Iterator[tuple[slice, Floats, Floats]]:
-    """Yield blocks of vectors (..., 3) as a slice, scaled columns of size one, and their sizes.
-
-    The size is taken out first, so that no load overflows or vanishes on the way.
-    """
-    rows = array.reshape(-1, 3)
-    for start in range(0, len(rows), BLOCK):
-        block = slice(start, start + BLOCK)
-        columns = np.divide(rows[block].T, 1.0, order="C")
-        sizes = np.abs(columns).max(axis=0)
-        columns /= np.where(sizes > 0.0, sizes, 1.0)
-        columns /= unit[:, np.newaxis]
-        yield block, columns, sizes
+        The size is taken out first, so that no load overflows or vanishes on the way.
+        """
+        rows = array.reshape(-1, 3)
+        count = self._block_columns
+        for start in range(0, len(rows), count):
+            block = slice(start, start + count)
+            columns = np.divide(rows[block].T, 1.0, order="C")
+            sizes = np.abs(columns).max(axis=0)
+            columns /= np.where(sizes > 0.0, sizes, 1.0)
+            columns /= unit[:, np.newaxis]
+            yield block, columns, sizes

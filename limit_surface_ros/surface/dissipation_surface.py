@@ -1,0 +1,87 @@
+"""Surfaces given by their dissipation D(v), a sum of norms: loads in closed form, twists exact."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from limit_surface_ros.surface.dissipation_inverse import DissipationInverse
+from limit_surface_ros.surface.dissipation_terms import FormTerms
+from limit_surface_ros.surface.quadratic_form import root_of
+from limit_surface_ros.surface.scaled_surface import ScaledSurface
+from limit_surface_ros.surface.sphere import even_directions
+
+if TYPE_CHECKING:
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.dissipation_terms import DissipationTerms
+
+# Twists that the inverse may start from.
+_STARTS = 400
+# Part of a load along a motion that nothing resists, above which the load causes that motion.
+_FREE = 1e-12
+# Relative eigenvalue below which a motion counts as resisted by nothing.
+_NO_RESISTANCE = 1e-14
+
+
+class DissipationSurface(ScaledSurface):
+    """What kinds share whose dissipation is a sum of norms, D(v) = sum_k sqrt(v' B_k v).
+
+    The load of maximum dissipation is the gradient of D; at a kink, where the twist belongs to a
+    facet, it is the facet's centre. A motion that no term resists (a single support point turns
+    freely) makes the load factor of any load along it infinite, and the twist that motion.
+    """
+
+    @property
+    @abstractmethod
+    def scaled_forms(self) -> Floats:
+        """The B_k in scaled variables, shape (k, 3, 3)."""
+
+    @cached_property
+    def _terms(self) -> DissipationTerms:
+        return FormTerms(np.array([root_of(form) for form in self.scaled_forms]))
+
+    @cached_property
+    def _free(self) -> Floats:
+        """Orthonormal motions that nothing resists, shape (q, 3)."""
+        total = self.scaled_forms.sum(axis=0)
+        size, vectors = np.linalg.eigh(total)
+        free: Floats = vectors[:, size <= _NO_RESISTANCE * size[-1]].T
+        return free
+
+    @cached_property
+    def _inverse(self) -> DissipationInverse:
+        terms = self._terms
+        if len(self._free):
+            # A resistance within one norm keeps the least twist at zero along the free motions.
+            forms = self.scaled_forms.copy()
+            forms[0] += np.trace(forms[0]) * self._free.T @ self._free
+            terms = FormTerms(np.array([root_of(form) for form in forms]))
+        return DissipationInverse(terms, even_directions(_STARTS).T)
+
+    def _loads(self, twists: Floats) -> Floats:
+        return self._terms.gradient(twists)
+
+    def _twists(self, loads: Floats) -> Floats:
+        twists = self._solve(loads)[0]
+        return np.asarray(twists / np.sqrt((twists * twists).sum(axis=0)))
+
+    def _load_factors(self, loads: Floats) -> Floats:
+        factors = np.zeros(loads.shape[1])
+        some = loads.any(axis=0)
+        if some.any():
+            factors[some] = self._solve(loads[:, some])[1]
+        return factors
+
+    def _solve(self, loads: Floats) -> tuple[Floats, Floats]:
+        """Return twists and load factors of scaled loads, of which none is zero."""
+        if not len(self._free):
+            return self._inverse.solve(loads)
+        along = self._free.T @ (self._free @ loads)
+        moves = np.abs(along).max(axis=0) > _FREE * np.abs(loads).max(axis=0)
+        twists, factors = along, np.full(loads.shape[1], np.inf)
+        if not moves.all():
+            twists[:, ~moves], factors[~moves] = self._inverse.solve((loads - along)[:, ~moves])
+        return twists, factors

@@ -1,0 +1,175 @@
+"""Least value of a gauge over a plane: the one optimisation behind both maps' inverses.
+
+A gauge g is positive and homogeneous of degree one. Where n.x = 1 is held and g(x) is least, the
+gradient of g is parallel to n and x / g(x) is the point of g = 1 with the largest n.x. With the
+dissipation as gauge this takes loads to twists, with a surface's load factor twists to loads.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from limit_surface_ros.errors import SolverError
+
+if TYPE_CHECKING:
+    from limit_surface_ros.checks import Bools, Floats
+
+# Newton's method stops after a step of this relative length: the next one would be its square.
+_LAST_STEP = 1e-8
+# It also stops where the sine of the angle between normal and gradient is below the first figure,
+# and where no step lowers the gauge any more; there that sine must be below the second.
+_TARGET = 1e-14
+_ACCEPTED = 1e-9
+_STEPS = 25
+_HALVINGS = 40
+# Relative smoothing of the kinks where Newton's method alone does not settle.
+_RATIO = 0.2
+_SMOOTHINGS = 0.3 * _RATIO ** np.arange(18)
+
+
+class Gauge(Protocol):
+    """A positive function, homogeneous of degree one, smooth but for kinks."""
+
+    def derivatives(self, points: Floats, smoothing: Floats, /) -> tuple[Floats, Floats, Floats]:
+        """Return the values (m,), gradients (3, m) and Hessians (3, 3, m).
+
+        Args:
+            points: Shape (3, m).
+            smoothing: Relative size to which kinks are rounded, shape (m,); may be 0.
+        """
+        ...
+
+
+def certain_minimum(gauge: Gauge, normals: Floats, starts: Floats) -> Floats:
+    """Return the points (3, m) where n.x = 1 and the gauge is least; see `plane_minimum`.
+
+    Where Newton's method does not settle the minimum is near a kink: it is then followed while
+    the kinks sharpen, along a path that is straight in the end.
+
+    Raises:
+        SolverError: A minimum could not be certified.
+    """
+    found, settled = plane_minimum(gauge, normals, starts, np.zeros(starts.shape[1]))
+    hard = np.flatnonzero(~settled)
+    if len(hard) == 0:
+        return found
+    path = before = found[:, hard]
+    for size in _SMOOTHINGS:
+        start = path + _RATIO * (path - before)
+        before = path
+        path, settled = plane_minimum(gauge, normals[:, hard], start, np.full(len(hard), size))
+    if not settled.all():
+        normal = normals[:, hard[np.argmin(settled)]].tolist()
+        raise SolverError(f"no answer could be certified for the scaled direction {normal}")
+    found[:, hard] = path
+    return found
+
+
+def plane_minimum(
+    gauge: Gauge, normals: Floats, starts: Floats, smoothing: Floats
+) -> tuple[Floats, Bools]:
+    """Return the points (3, m) where n.x = 1 and the gauge is least, and which are certain.
+
+    Newton's method with a line search in the two directions across each normal, all columns at
+    once. Where the gauge is not convex the minimum is a local one.
+
+    Args:
+        gauge: The gauge.
+        normals: n, unit vectors, shape (3, m).
+        starts: Points to start from, with n.x > 0, shape (3, m).
+        smoothing: Passed to the gauge, shape (m,).
+    """
+    points = starts / (normals * starts).sum(axis=0)
+    result = points.copy()
+    settled = np.zeros(points.shape[1], dtype=bool)
+    todo = np.arange(points.shape[1])
+    basis = _plane_basis(normals)
+    values, gradients, hessians = gauge.derivatives(points, smoothing)
+    for _ in range(_STEPS):
+        moves, slopes, sines = _newton_moves(normals, basis, points, gradients, hessians)
+        lengths = np.sqrt((moves * moves).sum(axis=0) / (points * points).sum(axis=0))
+        last = lengths <= _LAST_STEP
+        settled[todo] = last | (sines < _ACCEPTED)
+        result[:, todo] = points + np.where(last, moves, 0.0)
+        keep = ~last & (sines > _TARGET)
+        if not keep.all():
+            todo, normals, smoothing = todo[keep], normals[:, keep], smoothing[keep]
+            points, moves, slopes = points[:, keep], moves[:, keep], slopes[keep]
+            basis, values = basis[:, :, keep], values[keep]
+        if len(todo) == 0:
+            break
+        points, moved, values, gradients, hessians = _line_search(
+            gauge, points, moves, values, slopes, smoothing
+        )
+        if not moved.all():
+            todo, normals, smoothing = todo[moved], normals[:, moved], smoothing[moved]
+            points, basis, values = points[:, moved], basis[:, :, moved], values[moved]
+            gradients, hessians = gradients[:, moved], hessians[:, :, moved]
+    return result, settled
+
+
+def _newton_moves(
+    normals: Floats, basis: Floats, points: Floats, gradients: Floats, hessians: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Return Newton's moves (3, m) in the planes, slopes along them, and sines (m,)."""
+    first, second = basis
+    across_first = (first * gradients).sum(axis=0)
+    across_second = (second * gradients).sum(axis=0)
+    along = (normals * gradients).sum(axis=0)
+    sines = np.hypot(across_first, across_second) / np.where(along > 0.0, along, 1e-300)
+    bent_first = np.einsum("ijm,jm->im", hessians, first)
+    bent_second = np.einsum("ijm,jm->im", hessians, second)
+    a = (first * bent_first).sum(axis=0)
+    b = (first * bent_second).sum(axis=0)
+    c = (second * bent_second).sum(axis=0)
+    # Where the gauge is flat the answer is not unique and any step will do; where it bends down,
+    # it is made to bend up.
+    size = np.sqrt((gradients * gradients).sum(axis=0) / (points * points).sum(axis=0))
+    mean, spread = 0.5 * (a + c), np.hypot(0.5 * (a - c), b)
+    ridge = 1e-15 * spread + 1e-13 * size
+    ridge += np.where(mean < spread * (1.0 - 1e-10), 1.1 * spread - mean, 0.0)
+    a += ridge
+    c += ridge
+    determinant = np.maximum(a * c - b * b, ridge * (a + c))
+    p = (b * across_second - c * across_first) / determinant
+    q = (b * across_first - a * across_second) / determinant
+    length = np.hypot(p, q)
+    reach = np.sqrt((points * points).sum(axis=0))
+    shrink = np.where(length > reach, reach / np.where(length > 0.0, length, 1.0), 1.0)
+    p *= shrink
+    q *= shrink
+    return p * first + q * second, p * across_first + q * across_second, sines
+
+
+def _line_search(
+    gauge: Gauge, points: Floats, moves: Floats, values: Floats, slopes: Floats, smoothing: Floats
+) -> tuple[Floats, Bools, Floats, Floats, Floats]:
+    """Halve the moves until the gauge falls; return points, which moved, and the derivatives."""
+    trial = points + moves
+    new_values, gradients, hessians = gauge.derivatives(trial, smoothing)
+    high = np.flatnonzero(new_values > values * (1.0 + 1e-15) + 1e-4 * slopes)
+    step = 1.0
+    for _ in range(_HALVINGS):
+        if len(high) == 0:
+            break
+        step *= 0.5
+        trial[:, high] = points[:, high] + step * moves[:, high]
+        new_values[high], gradients[:, high], hessians[:, :, high] = gauge.derivatives(
+            trial[:, high], smoothing[high]
+        )
+        bound = values[high] * (1.0 + 1e-15) + 1e-4 * step * slopes[high]
+        high = high[new_values[high] > bound]
+    moved = np.ones(len(values), dtype=bool)
+    moved[high] = False
+    return trial, moved, new_values, gradients, hessians
+
+
+def _plane_basis(normals: Floats) -> Floats:
+    """Return for unit vectors (3, m) two unit vectors across each and each other, (2, 3, m)."""
+    x, y, z = normals
+    sign = np.where(z >= 0.0, 1.0, -1.0)
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    return np.array([[1.0 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y]])

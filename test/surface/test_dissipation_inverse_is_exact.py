@@ -1,0 +1,117 @@
+"""The twist of a load is the one of most power for its dissipation, on facets and edges too."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from limit_surface_ros.surface import measures, sampling
+from limit_surface_ros.surface.dissipation import Dissipation
+from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.scaling import Scaling
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def random_contacts(rng, count):
+    return PointContacts(
+        0.1 * rng.standard_normal((count, 2)), rng.uniform(0.1, 1, count), Scaling(0.1, count / 2)
+    )
+
+
+def random_dissipation(rng, terms, rank):
+    roots = rng.standard_normal((terms, rank, 3))
+    return Dissipation(np.swapaxes(roots, 1, 2) @ roots, Scaling(0.2, 3.0))
+
+
+def assert_in_normal_cones(surface, loads):
+    """The load on the surface has all the power that any load can have with its twist."""
+    on_surface = loads / surface.load_factor(loads)[:, np.newaxis]
+    twists = surface.twist_of_wrench(loads)
+    power = (on_surface * twists).sum(axis=1)
+    most = (surface.wrench_of_twist(twists) * twists).sum(axis=1)
+    np.testing.assert_allclose(power, most, rtol=1e-12)
+    probes = sampling.random_directions(300, 0) * surface.scaling.twist_unit
+    limits = (surface.wrench_of_twist(probes) * probes).sum(axis=1)
+    assert (on_surface @ probes.T <= limits * (1.0 + 1e-9) + 1e-12).all()
+
+
+@given(seeds, st.integers(2, 12))
+def test_motion_to_load_to_motion_is_the_identity_for_support_points(seed, count):
+    contacts = random_contacts(np.random.default_rng(seed), count)
+    pairs = sampling.random_motions(contacts, 50, seed)
+    np.testing.assert_allclose(contacts.load_factor(pairs.wrenches), 1.0, rtol=1e-12)
+    if count > 2:
+        assert measures.angle_error(contacts, pairs).max() < 1e-8
+
+
+@given(seeds, st.integers(2, 12))
+def test_a_facet_gives_its_own_rotation(seed, count):
+    contacts = random_contacts(np.random.default_rng(seed), count)
+    pairs = sampling.facet_loads(contacts, 5, seed)
+    assert measures.angle_error(contacts, pairs).max() < 1e-12
+    assert measures.angle_error(contacts.dissipation(), pairs).max() < 1e-6
+
+
+@given(seeds, st.integers(1, 6), st.integers(1, 3))
+def test_any_load_lies_in_the_normal_cone_of_its_twist(seed, terms, rank):
+    rng = np.random.default_rng(seed)
+    surface = random_dissipation(rng, terms, rank)
+    loads = sampling.random_motions(surface, 40, rng).wrenches
+    assert_in_normal_cones(surface, loads[np.abs(loads).max(axis=1) > 1e-6])
+    if terms * rank >= 3:
+        assert_in_normal_cones(surface, rng.standard_normal((40, 3)))
+
+
+@pytest.mark.parametrize("outside", [0.0, 1e-13, 1e-10, 1e-7, 1e-4, 1e-2])
+@pytest.mark.parametrize("count", [2, 3, 40])
+def test_loads_at_the_rim_of_a_facet_are_in_its_normal_cone(outside, count):
+    rng = np.random.default_rng(count)
+    contacts = random_contacts(rng, count)
+    x, y = contacts.points.T
+    turn = np.stack([y, -x, np.ones_like(x)], axis=1)
+    angle = rng.uniform(0.0, 2.0 * np.pi, count)
+    size = contacts.friction_limits * (1.0 + outside)
+    fx, fy = size * np.cos(angle), size * np.sin(angle)
+    rim = contacts.wrench_of_twist(turn) + np.stack([fx, fy, x * fy - y * fx], axis=1)
+    assert_in_normal_cones(contacts, rim)
+
+
+def test_a_line_of_points_pulled_across_is_solved_at_its_corners():
+    x = np.linspace(-1.0, 1.0, 41)
+    line = PointContacts(np.stack([x, np.zeros(41)], axis=1), np.full(41, 1.0 / 41))
+    forces = np.linspace(-1.0, 1.0, 60)
+    loads = np.stack([np.zeros(60), forces, 0.3 * np.ones(60)], axis=1)
+    assert_in_normal_cones(line, loads)
+
+
+def test_the_dissipation_of_points_gives_the_loads_of_the_points():
+    contacts = random_contacts(np.random.default_rng(3), 5)
+    twists = sampling.random_directions(1000, 4)
+    np.testing.assert_allclose(
+        contacts.dissipation().wrench_of_twist(twists),
+        contacts.wrench_of_twist(twists),
+        rtol=1e-11,
+    )
+
+
+def test_coincident_points_and_points_without_friction_are_as_one_and_none():
+    merged = PointContacts([[0, 0], [1, 0], [0, 1]], [2, 1, 1])
+    parts = PointContacts([[0, 0], [5, 5], [1, 0], [0, 0], [0, 1]], [1, 0, 1, 1, 1])
+    facet = sampling.facet_loads(merged, 20, 5)
+    np.testing.assert_allclose(parts.twist_of_wrench(facet.wrenches), facet.twists, atol=1e-14)
+    assert parts.dissipation().matrices.shape == (4, 3, 3)
+    rotated = parts.dissipation().twist_of_wrench(facet.wrenches)
+    np.testing.assert_allclose(rotated, facet.twists, atol=1e-6)
+
+
+def test_loads_far_from_one_newton_are_solved_alike():
+    contacts = random_contacts(np.random.default_rng(8), 4)
+    loads = np.random.default_rng(9).standard_normal((30, 3))
+    for size in (1e-300, 1e-9, 1e9, 1e150):
+        np.testing.assert_allclose(
+            contacts.twist_of_wrench(size * loads), contacts.twist_of_wrench(loads), atol=1e-9
+        )
+        np.testing.assert_allclose(
+            contacts.load_factor(size * loads), size * contacts.load_factor(loads), rtol=1e-12
+        )
