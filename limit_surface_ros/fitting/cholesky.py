@@ -1,0 +1,61 @@
+"""Positive semidefinite matrices as free parameters: lower-triangular Cholesky factors.
+
+A = L L' is positive semidefinite for every L, so that an unconstrained optimiser can never leave
+the family. Each matrix takes six parameters: L's lower triangle, row by row.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from limit_surface_ros.checks import Floats
+
+PARAMETERS_PER_MATRIX = 6
+
+_ROWS, _COLUMNS = np.tril_indices(3)
+
+
+def factors_of(parameters: Floats) -> Floats:
+    """Return the factors L, shape (m, 3, 3), of flat `parameters`, shape (6 m)."""
+    factors = np.zeros((parameters.size // PARAMETERS_PER_MATRIX, 3, 3))
+    factors[:, _ROWS, _COLUMNS] = parameters.reshape(-1, PARAMETERS_PER_MATRIX)
+    return factors
+
+
+def parameters_of(factors: Floats) -> Floats:
+    """Return the flat parameters, shape (6 m), of lower-triangular `factors`, shape (m, 3, 3)."""
+    return factors[:, _ROWS, _COLUMNS].ravel()
+
+
+def matrices_of(factors: Floats) -> Floats:
+    """Return the matrices A = L L', shape (m, 3, 3), exactly symmetric."""
+    matrices: Floats = factors @ factors.transpose(0, 2, 1)
+    return 0.5 * (matrices + matrices.transpose(0, 2, 1))
+
+
+def parameter_gradient(matrix_gradient: Floats, factors: Floats) -> Floats:
+    """Chain a gradient with respect to A to the parameters of L: dJ/dL = (G + G') L.
+
+    Args:
+        matrix_gradient: Shape (m, 3, 3), G with dJ = sum_ij G_ij dA_ij, symmetric or not.
+        factors: Shape (m, 3, 3), lower triangular.
+
+    Returns:
+        Shape (6 m).
+    """
+    symmetric = matrix_gradient + matrix_gradient.transpose(0, 2, 1)
+    return parameters_of(symmetric @ factors)
+
+
+def factors_of_matrices(matrices: Floats) -> Floats:
+    """Return lower-triangular factors of positive semidefinite `matrices`, rank-deficient too.
+
+    A = E diag(w) E' has the factor R' of the QR decomposition of diag(sqrt(w)) E'.
+    """
+    values, vectors = np.linalg.eigh(matrices)
+    roots = np.sqrt(np.maximum(values, 0.0))[..., None] * vectors.transpose(0, 2, 1)
+    upper = np.stack([np.linalg.qr(root, mode="r") for root in roots])
+    return np.asarray(upper.transpose(0, 2, 1))

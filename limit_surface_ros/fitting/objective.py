@@ -1,0 +1,36 @@
+"""What a fit minimises, apart from how: an objective builds the problem, `multi_start` solves it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.protocol import LimitSurface
+
+
+class Objective(Protocol):
+    """A cost with its gradient over free parameters, and the surface that they stand for.
+
+    Objectives are picklable, so that starts can run in other processes. They may hold work
+    arrays: one objective serves one thread at a time.
+    """
+
+    @property
+    def size(self) -> int:
+        """Number of parameters."""
+        ...
+
+    def cost_and_gradient(self, parameters: Floats) -> tuple[float, Floats]:
+        """Return the cost and its gradient, shape (size,)."""
+        ...
+
+    def start(self, rng: np.random.Generator) -> Floats:
+        """Return random parameters from which a descent may begin, shape (size,)."""
+        ...
+
+    def surface(self, parameters: Floats) -> LimitSurface:
+        """Return the surface of `parameters`."""
+        ...

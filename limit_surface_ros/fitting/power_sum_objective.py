@@ -1,0 +1,165 @@
+"""J1 and J2 of a power sum, with their gradient by matrix calculus (thesis 3.5 to 3.10).
+
+    J = sum_k (H(f_k) - 1)^2 + w |v_k - v^(f_k)|^2,   H(f) = sum_i (f' A_i f)^(p_i)
+
+where v^ is the unit gradient of H and w the velocity weight: J1 has w = 0, the thesis's J2 w = 1.
+With q_i = f' A_i f, c_i = 2 p_i q_i^(p_i - 1), the gradient of H is g = sum_i c_i A_i f. Let
+s = dJ/dg = 2 w ((v . v^) v^ - v) / |g|; then
+
+    dJ/dA_i = sum_k a_ik f f' + c_ik s f',   a_ik = c_ik ((H - 1) + (p_i - 1) (s' A_i f) / q_i)
+
+so that the gradient of all terms is one matrix product over the pairs, about twice the work of
+the cost alone.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from limit_surface_ros.fitting.cholesky import (
+    PARAMETERS_PER_MATRIX,
+    factors_of,
+    matrices_of,
+    parameter_gradient,
+    parameters_of,
+)
+from limit_surface_ros.surface.power_sum import PowerSum
+
+if TYPE_CHECKING:
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.scaling import Scaling
+
+# Keeps powers and logarithms of a quadratic form finite where a matrix has lost the load's
+# direction; in scaled variables it is far below anything that a fit can see.
+_TINY = 1e-100
+
+
+class PowerSumObjective:
+    """J1 or J2 of a power sum over scaled pairs.
+
+    Attributes:
+        exponents: Shape (m,), the powers p_i.
+        velocity_weight: w; 0 gives J1.
+    """
+
+    def __init__(
+        self,
+        wrenches: Floats,
+        directions: Floats,
+        exponents: Floats,
+        velocity_weight: float,
+        scaling: Scaling,
+    ) -> None:
+        """Hold the pairs, one column each, and the work arrays.
+
+        Args:
+            wrenches: Shape (n, 3), scaled.
+            directions: Shape (n, 3), scaled unit twists.
+            exponents: Shape (m,).
+            velocity_weight: w >= 0.
+            scaling: What the surface's physical units are.
+        """
+        self.exponents = exponents
+        self.velocity_weight = velocity_weight
+        self._scaling = scaling
+        self._loads = np.ascontiguousarray(wrenches.T)
+        self._directions = np.ascontiguousarray(directions.T)
+        terms, pairs = exponents.size, len(wrenches)
+        self._powers = exponents[:, None]
+        # A step allocates nothing of the pairs' size: memory that goes back to the system at
+        # each step costs three times the arithmetic.
+        self._products = np.empty((terms, 3, pairs))
+        self._weighted = np.empty((terms, 3, pairs))
+        self._forms = np.empty((terms, pairs))
+        self._values = np.empty((terms, pairs))
+        self._slopes = np.empty((terms, pairs))
+        self._bends = np.empty((terms, pairs))
+        self._normals = np.empty((3, pairs))
+
+    @property
+    def size(self) -> int:
+        """Number of parameters: six for each term."""
+        return PARAMETERS_PER_MATRIX * self.exponents.size
+
+    def cost(self, parameters: Floats) -> float:
+        """Return the cost alone."""
+        matrices = matrices_of(factors_of(parameters))
+        residual = self._evaluate(matrices)
+        cost = float(residual @ residual)
+        if self.velocity_weight > 0.0:
+            cost += self._velocity_cost(self._normalise()[1])
+        return cost
+
+    def cost_and_gradient(self, parameters: Floats) -> tuple[float, Floats]:
+        """Return the cost and its gradient, shape (6 m,)."""
+        factors = factors_of(parameters)
+        residual = self._evaluate(matrices_of(factors))
+        cost = float(residual @ residual)
+        loads, bends, slopes = self._loads, self._bends, self._slopes
+        if self.velocity_weight > 0.0:
+            norms, cosines = self._normalise()
+            cost += self._velocity_cost(cosines)
+            pull = self._normals
+            pull *= cosines
+            pull -= self._directions
+            pull *= 2.0 * self.velocity_weight / norms
+            np.einsum("mcn,cn->mn", self._products, pull, out=bends)
+            bends *= self._powers - 1.0
+            bends /= self._forms
+            bends += residual
+            bends *= slopes
+            weighted = np.multiply(slopes[:, None], pull, out=self._weighted)
+            # The products A_i f are no longer needed: their array takes the other half.
+            weighted += np.multiply(bends[:, None], loads, out=self._products)
+        else:
+            np.multiply(slopes, residual, out=bends)
+            weighted = np.multiply(bends[:, None], loads, out=self._weighted)
+        gradient = weighted.reshape(-1, loads.shape[1]) @ loads.T
+        return cost, parameter_gradient(gradient.reshape(-1, 3, 3), factors)
+
+    def start(self, rng: np.random.Generator) -> Floats:
+        """Return random factors, whitened by the loads, with every term 1/m on average."""
+        spread = self._loads @ self._loads.T / self._loads.shape[1]
+        spread += 1e-9 * np.trace(spread) * np.eye(3)
+        whitener = np.linalg.inv(np.linalg.cholesky(spread)).T
+        factors = np.tril(rng.normal(size=(self.exponents.size, 3, 3)))
+        matrices = whitener @ matrices_of(factors) @ whitener.T
+        factors = np.linalg.cholesky(
+            matrices + 1e-9 * np.trace(matrices, axis1=1, axis2=2)[:, None, None] * np.eye(3)
+        )
+        self._evaluate(matrices_of(factors))
+        scale: Floats = self._values.mean(axis=1) * self.exponents.size
+        return parameters_of(factors * (scale ** (-0.5 / self.exponents))[:, None, None])
+
+    def surface(self, parameters: Floats) -> PowerSum:
+        """Return the power sum of `parameters`."""
+        return PowerSum(matrices_of(factors_of(parameters)), self.exponents, self._scaling)
+
+    def _evaluate(self, matrices: Floats) -> Floats:
+        """Fill products A_i f, forms q_i, values q_i^p_i and slopes c_i; return H - 1."""
+        loads, forms, values, slopes = self._loads, self._forms, self._values, self._slopes
+        terms, pairs = forms.shape
+        np.matmul(matrices.reshape(-1, 3), loads, out=self._products.reshape(-1, pairs))
+        np.einsum("mcn,cn->mn", self._products, loads, out=forms)
+        np.maximum(forms, _TINY, out=forms)
+        np.log(forms, out=values)
+        values *= self._powers
+        np.exp(values, out=values)
+        np.divide(values, forms, out=slopes)
+        slopes *= 2.0 * self._powers
+        residual: Floats = values.sum(axis=0) - 1.0
+        return residual
+
+    def _normalise(self) -> tuple[Floats, Floats]:
+        """Fill the unit normals; return the gradients' norms and v . v^."""
+        normals = np.einsum("mn,mcn->cn", self._slopes, self._products, out=self._normals)
+        norms = np.sqrt(np.einsum("cn,cn->n", normals, normals))
+        np.maximum(norms, _TINY, out=norms)
+        normals /= norms
+        return norms, np.einsum("cn,cn->n", normals, self._directions)
+
+    def _velocity_cost(self, cosines: Floats) -> float:
+        """Return w sum |v - v^|^2 = 2 w sum (1 - v . v^)."""
+        return 2.0 * self.velocity_weight * float(cosines.size - cosines.sum())
