@@ -17,13 +17,19 @@ EXTRAS = {
 }
 
 # Each program's name and the module whose main() it runs.
-PROGRAMS: dict[str, str] = {}
+PROGRAMS: dict[str, str] = {
+    "fit_surface": "limit_surface_ros.tools.fit_surface",
+}
 
 
-def installed_files(folder: str) -> tuple[str, list[str]]:
-    """Return a data_files entry that installs the files of `folder` under share/."""
-    files = sorted(str(path) for path in Path(folder).glob("*") if path.is_file())
-    return f"share/{PACKAGE}/{folder}", files
+def installed_files(folder: str) -> list[tuple[str, list[str]]]:
+    """Return data_files entries that install `folder` and the folders in it under share/."""
+    files = sorted(path for path in Path(folder).rglob("*") if path.is_file())
+    places = sorted({path.parent for path in files})
+    return [
+        (f"share/{PACKAGE}/{place}", [str(path) for path in files if path.parent == place])
+        for place in places
+    ]
 
 
 setup(
@@ -38,8 +44,8 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
-        installed_files("config"),
-        installed_files("launch"),
+        *installed_files("config"),
+        *installed_files("launch"),
     ],
     python_requires=">=3.10",
     install_requires=["numpy", "scipy", "pyyaml"],

@@ -32,8 +32,8 @@ def parameters_of(factors: Floats) -> Floats:
 
 def matrices_of(factors: Floats) -> Floats:
     """Return the matrices A = L L', shape (m, 3, 3), exactly symmetric."""
-    matrices: Floats = factors @ factors.transpose(0, 2, 1)
-    return 0.5 * (matrices + matrices.transpose(0, 2, 1))
+    matrices = factors @ factors.transpose(0, 2, 1)
+    return np.asarray(0.5 * (matrices + matrices.transpose(0, 2, 1)))
 
 
 def parameter_gradient(matrix_gradient: Floats, factors: Floats) -> Floats:

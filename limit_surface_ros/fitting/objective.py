@@ -1,4 +1,4 @@
-"""What a fit minimises, apart from how: an objective builds the problem, `multi_start` solves it."""
+"""What a fit minimises: an objective builds the problem, `multi_start` solves it."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ the cost alone.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -78,6 +78,11 @@ class PowerSumObjective:
         self._bends = np.empty((terms, pairs))
         self._normals = np.empty((3, pairs))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel to other processes without the work arrays."""
+        data = (self._loads.T, self._directions.T, self.exponents)
+        return type(self), (*data, self.velocity_weight, self._scaling)
+
     @property
     def size(self) -> int:
         """Number of parameters: six for each term."""
@@ -140,8 +145,7 @@ class PowerSumObjective:
     def _evaluate(self, matrices: Floats) -> Floats:
         """Fill products A_i f, forms q_i, values q_i^p_i and slopes c_i; return H - 1."""
         loads, forms, values, slopes = self._loads, self._forms, self._values, self._slopes
-        terms, pairs = forms.shape
-        np.matmul(matrices.reshape(-1, 3), loads, out=self._products.reshape(-1, pairs))
+        np.matmul(matrices.reshape(-1, 3), loads, out=self._products.reshape(-1, loads.shape[1]))
         np.einsum("mcn,cn->mn", self._products, loads, out=forms)
         np.maximum(forms, _TINY, out=forms)
         np.log(forms, out=values)

@@ -1,0 +1,183 @@
+"""Descents from several seeded starts: in parallel, in a fixed order, stopped when they agree.
+
+Fits of limit surfaces have many local minima. Start number k draws from a generator of its own,
+seeded by (seed, k), and starts are judged in their order; so the outcome is the same whatever the
+number of workers.
+"""
+
+from __future__ import annotations
+
+import math
+import multiprocessing
+import signal
+import threading
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import minimize
+
+from limit_surface_ros.errors import RangeError, SolverError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.fitting.objective import Objective
+
+    Progress = Callable[[int, int], None]
+
+# Relative difference of cost within which two starts have found the same minimum.
+AGREEMENT = 1e-3
+_MAX_ITERATIONS = 2000
+# Pairs of steps that L-BFGS remembers: about the number of parameters, so that it is BFGS in all
+# but name and a step costs next to nothing.
+_MEMORY = 30
+
+
+@dataclass(frozen=True)
+class Search:
+    """How a minimum is looked for, the same for every kind.
+
+    Attributes:
+        starts: How many random starts at most.
+        seed: The same seed gives the same starts.
+        executor: Where starts run; here and one by one if not given. `process_pool` makes one, a
+            dask client's `get_executor()` is another.
+        progress: Called with (starts done, starts at most) after each.
+
+    Raises:
+        RangeError: There is no start, or the seed is negative.
+    """
+
+    starts: int = 8
+    seed: int = 0
+    executor: Executor | None = None
+    progress: Progress | None = None
+
+    def __post_init__(self) -> None:
+        """Check the counts."""
+        if self.starts < 1:
+            raise RangeError(f"starts must be at least 1, got {self.starts}")
+        if self.seed < 0:
+            raise RangeError(f"seed must not be negative, got {self.seed}")
+
+
+@dataclass(frozen=True)
+class Descent:
+    """Where one start led.
+
+    Attributes:
+        cost: The cost there.
+        parameters: Shape (size,).
+        iterations: Steps taken.
+        evaluations: Times that cost and gradient were computed.
+        gradient_norm: Largest component of the gradient there.
+        converged: Whether the descent ended because nothing more was to be gained.
+    """
+
+    cost: float
+    parameters: Floats
+    iterations: int
+    evaluations: int
+    gradient_norm: float
+    converged: bool
+
+
+def descend(objective: Objective, start: Floats) -> Descent:
+    """Minimise by BFGS with limited memory from `start`."""
+    found = minimize(
+        objective.cost_and_gradient,
+        start,
+        jac=True,
+        method="L-BFGS-B",
+        options={
+            "maxcor": _MEMORY,
+            "maxiter": _MAX_ITERATIONS,
+            "maxfun": 2 * _MAX_ITERATIONS,
+            "ftol": 1e-10,
+            "gtol": 1e-8,
+        },
+    )
+    return Descent(
+        cost=float(found.fun),
+        parameters=np.asarray(found.x),
+        iterations=int(found.nit),
+        evaluations=int(found.nfev),
+        gradient_norm=float(np.abs(found.jac).max()),
+        converged=found.status == 0,
+    )
+
+
+def descend_from_seed(objective: Objective, seed: int, index: int) -> Descent:
+    """Minimise from start number `index` of `seed`."""
+    return descend(objective, objective.start(np.random.default_rng([seed, index])))
+
+
+def descents(objective: Objective, search: Search) -> list[Descent]:
+    """Minimise from several starts, in their order, until half of them agree on the best.
+
+    Returns:
+        One descent for each start that was needed, the best first, equals in their order.
+
+    Raises:
+        SolverError: No start led to a finite cost.
+    """
+    enough = max(2, math.ceil(search.starts / 2))
+    done: list[Descent] = []
+    for descent in _in_order(objective, search):
+        done.append(descent)
+        if search.progress is not None:
+            search.progress(len(done), search.starts)
+        best = min(each.cost for each in done)
+        agreeing = sum(each.cost <= best * (1.0 + AGREEMENT) for each in done)
+        if agreeing >= enough:
+            break
+    if not any(math.isfinite(each.cost) for each in done):
+        raise SolverError(f"none of {search.starts} starts led to a finite cost")
+    return sorted(done, key=lambda each: each.cost)
+
+
+@contextmanager
+def process_pool(workers: int) -> Iterator[Executor | None]:
+    """Give an executor of `workers` processes, or None for one: then work runs here.
+
+    Interrupted, it leaves no process behind and the workers print nothing.
+
+    Raises:
+        RangeError: `workers` is below 1.
+    """
+    if workers < 1:
+        raise RangeError(f"workers must be at least 1, got {workers}")
+    if workers == 1:
+        yield None
+        return
+    # Forking is instant and safe while there are no threads; otherwise workers start afresh.
+    alone = threading.active_count() == 1 and "fork" in multiprocessing.get_all_start_methods()
+    context = multiprocessing.get_context("fork" if alone else "spawn")
+    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_ignore_interrupt)
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _in_order(objective: Objective, search: Search) -> Iterator[Descent]:
+    starts, seed, executor = range(search.starts), search.seed, search.executor
+    if executor is None:
+        for index in starts:
+            yield descend_from_seed(objective, seed, index)
+        return
+    futures = [executor.submit(descend_from_seed, objective, seed, index) for index in starts]
+    try:
+        for future in futures:
+            yield future.result()
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+def _ignore_interrupt() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

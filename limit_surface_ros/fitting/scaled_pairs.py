@@ -1,0 +1,107 @@
+"""Pairs made dimensionless for a fit, and the checks that they can support one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from limit_surface_ros.errors import DataError
+from limit_surface_ros.surface.scaling import Scaling
+
+if TYPE_CHECKING:
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.pairs import Pairs
+
+# Share of the motions' second moment along one line from which on they are one motion: all within
+# about 8 degrees of it.
+_ONE_DIRECTION = 0.98
+# Relative second moment below which the loads leave a direction of load untried.
+_UNTRIED = 1e-8
+
+
+@dataclass(frozen=True)
+class ScaledPairs:
+    """Loads and unit motions in scaled variables.
+
+    Attributes:
+        wrenches: Shape (n, 3).
+        directions: Unit twists, shape (n, 3).
+        scaling: What they were scaled with.
+    """
+
+    wrenches: Floats
+    directions: Floats
+    scaling: Scaling
+
+    def __len__(self) -> int:
+        """Return the number of pairs."""
+        return len(self.wrenches)
+
+
+def scaling_of_pairs(pairs: Pairs, characteristic_length: float | None = None) -> Scaling:
+    """Choose scales from data, so that the choice moves with the units of the data.
+
+    The friction force scale is the root mean square of the forces; the characteristic length, if
+    it is not given, that of the moments over it, so that forces and moments weigh alike.
+
+    Raises:
+        DataError: All forces are zero, or all moments and no length is given.
+        RangeError: The length is not above zero.
+    """
+    force = float(np.sqrt(np.mean(np.sum(pairs.wrenches[:, :2] ** 2, axis=1))))
+    if not force > 0.0:
+        raise DataError("all forces are zero: the pairs say nothing about friction")
+    if characteristic_length is None:
+        characteristic_length = float(np.sqrt(np.mean(pairs.wrenches[:, 2] ** 2))) / force
+        if not characteristic_length > 0.0:
+            raise DataError(
+                "all moments are zero: the pairs say nothing about rotation or a length"
+            )
+    return Scaling(characteristic_length, force)
+
+
+def scale_pairs(pairs: Pairs, scaling: Scaling | None = None) -> ScaledPairs:
+    """Scale pairs; without a scaling, by `scaling_of_pairs`.
+
+    Raises:
+        DataError: See `scaling_of_pairs`.
+    """
+    scaling = scaling or scaling_of_pairs(pairs)
+    directions = pairs.twists / scaling.twist_unit
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    return ScaledPairs(pairs.wrenches / scaling.wrench_unit, directions, scaling)
+
+
+def check_support(pairs: ScaledPairs, parameters: int) -> None:
+    """Refuse pairs that cannot determine a surface.
+
+    Args:
+        pairs: What is to be fitted.
+        parameters: How many numbers the fit is to find; 0 leaves the count unchecked.
+
+    Raises:
+        DataError: There are fewer pairs than parameters, all motions are one, or a direction of
+            load was never tried.
+    """
+    count = len(pairs)
+    if count < max(parameters, 1):
+        raise DataError(
+            f"{count} pairs cannot determine {parameters} parameters: give more pairs, fewer "
+            "terms, or a fit that is held by a prior"
+        )
+    moments = np.linalg.eigvalsh(pairs.directions.T @ pairs.directions / count)
+    if moments[-1] > _ONE_DIRECTION:
+        raise DataError(
+            "all motions go in one direction: they cannot determine a surface; "
+            "push and turn the body in several directions"
+        )
+    scaled = pairs.wrenches / np.abs(pairs.wrenches).max()
+    loads, axes = np.linalg.eigh(scaled.T @ scaled / count)
+    if loads[0] <= _UNTRIED * loads[-1]:
+        untried = ", ".join(f"{component:.2f}" for component in axes[:, 0])
+        raise DataError(
+            f"no load has a component along the scaled direction ({untried}): "
+            "the surface is unbounded there"
+        )

@@ -1,0 +1,87 @@
+"""fit_surface: from data to a model file, or one clear line and no file."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from limit_surface_ros.files.pushes_csv import read_pushes
+from limit_surface_ros.files.surface_file import read_surface_model
+from limit_surface_ros.surface.measures import mean_angle
+from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.sampling import random_motions
+from limit_surface_ros.surface.scaling import Scaling
+from limit_surface_ros.tools.fit_surface import main
+
+RECORDED = Path(__file__).parents[3] / "shared" / "data" / "pushing"
+TRIANGLE = PointContacts(
+    np.array([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]]), np.full(3, 0.5), Scaling(0.15)
+)
+
+
+@pytest.fixture
+def pushes(tmp_path):
+    """A CSV of 60 exact pushes of the triangle."""
+    pairs = random_motions(TRIANGLE, 60, 0)
+    rows = np.hstack([pairs.wrenches, pairs.twists])
+    lines = ["fx_N,fy_N,tau_Nm,vx,vy,omega", *(",".join(map(repr, row.tolist())) for row in rows)]
+    path = tmp_path / "pushes.csv"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_a_model_is_fitted_and_written_with_its_history(pushes, tmp_path, capsys):
+    output = tmp_path / "model.yaml"
+    arguments = [str(pushes), "-o", str(output), "--terms", "2", "--rows", "0-39", "--starts", "4"]
+    assert main(arguments) == 0
+    printed = capsys.readouterr().out
+    for word in ("cost", "training", "held out", "time"):
+        assert word in printed
+    model = read_surface_model(output)
+    assert model.name == "model"
+    assert model.fit["held_out"]["pairs"] == 20
+    assert model.fit["objective"] == "J2, velocity weight 1"
+    assert f"fit_surface {pushes}" in output.read_text().splitlines()[0]
+    test = random_motions(TRIANGLE, 500, 1)
+    assert np.degrees(mean_angle(model.surface, test)) < 8.0
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda lines: [lines[0].replace("vx", "speed"), *lines[1:]], "column vx is missing"),
+        (lambda lines: [*lines[:5], "a" + lines[5], *lines[6:]], "line 6: column fx_N"),
+        (lambda lines: [*lines, "nan,1,1,1,1,1"], "line 62: column fx_N: must be finite"),
+        (lambda lines: lines[:10], "9 pairs cannot determine 18 parameters"),
+        (lambda lines: [lines[0], *([lines[1]] * 60)], "all motions go in one direction"),
+    ],
+)
+def test_bad_data_give_one_line_and_no_file(pushes, tmp_path, capsys, change, message):
+    pushes.write_text("\n".join(change(pushes.read_text().splitlines())) + "\n")
+    output = tmp_path / "model.yaml"
+    assert main([str(pushes), "-o", str(output)]) == 2
+    printed = capsys.readouterr().err
+    assert message in printed
+    assert len(printed.splitlines()) == 1
+    assert not output.exists()
+
+
+def test_an_unknown_input_is_refused(tmp_path, capsys):
+    other = tmp_path / "data.txt"
+    other.touch()
+    assert main([str(other), "-o", str(tmp_path / "m.yaml")]) == 2
+    assert ".txt is not known; accepted is" in capsys.readouterr().err
+    assert main([str(tmp_path / "none.csv"), "-o", str(tmp_path / "m.yaml")]) == 2
+    assert "there is no such file" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(not RECORDED.is_dir(), reason="recorded pushes are not at ../shared/data")
+def test_real_pushes_are_predicted_within_twelve_degrees(tmp_path):
+    name = "hardboard_10_130_10_10_10_130"
+    rows = json.loads((RECORDED / "splits.json").read_text())[name]["25"][0]
+    output = tmp_path / "model.yaml"
+    pushes = RECORDED / f"{name}.csv"
+    assert main([str(pushes), "-o", str(output), "--rows", ",".join(map(str, rows))]) == 0
+    held_out = read_pushes(pushes).rest(rows)
+    assert np.degrees(mean_angle(read_surface_model(output).surface, held_out)) < 12.0
