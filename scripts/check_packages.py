@@ -37,10 +37,11 @@ def imported_modules(folder: Path) -> dict[str, Path]:
                 continue
             for name in names:
                 found.setdefault(name.partition(".")[0], path.relative_to(ROOT))
+    own = {NAME, *(path.stem for path in (ROOT / "scripts").rglob("*.py"))}
     return {
         name: path
         for name, path in found.items()
-        if name != NAME and name not in sys.stdlib_module_names
+        if name not in own and name not in sys.stdlib_module_names
     }
 
 
@@ -54,13 +55,18 @@ def optional_distributions() -> set[str]:
 
 
 def undeclared(package: Package) -> list[str]:
-    """Return a sentence for each import of the package's code that nothing declares."""
-    declared = {dependency.name for dependency in package.exec_depends}
+    """Return a sentence for each import of code or tests that nothing declares."""
     optional = optional_distributions()
+    running = {dependency.name for dependency in package.exec_depends}
+    testing = running | {dependency.name for dependency in package.test_depends}
     return [
-        f"package.xml: {path} imports {module}, but there is no exec_depend on"
+        f"package.xml: {path} imports {module}, but there is no {tag} on"
         f" {ROSDEP_KEYS.get(module, module)}"
-        for module, path in imported_modules(ROOT / NAME).items()
+        for folder, tag, declared in (
+            (NAME, "exec_depend", running),
+            ("test", "exec_depend or test_depend", testing),
+        )
+        for module, path in imported_modules(ROOT / folder).items()
         if ROSDEP_KEYS.get(module, module) not in declared
         and DISTRIBUTIONS.get(module, module) not in optional
     ]
