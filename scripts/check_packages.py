@@ -21,7 +21,7 @@ ROSDEP_KEYS = {
     "yaml": "python3-yaml",
 }
 # Modules that setup.py names by another name than theirs.
-DISTRIBUTIONS = {"yaml": "pyyaml"}
+DISTRIBUTIONS = {"cycler": "matplotlib", "mpl_toolkits": "matplotlib", "yaml": "pyyaml"}
 
 
 def imported_modules(folder: Path) -> dict[str, Path]:
