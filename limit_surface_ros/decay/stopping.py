@@ -57,17 +57,6 @@ def onset_value(x: ExponentialSum) -> float:
     return start
 
 
-def time_to_fraction(x: ExponentialSum, fraction: float) -> float:
-    """Return the time [s] from which on |x(t) / x(0)| stays at or below a fraction for good.
-
-    Raises:
-        NoOnsetError: x(0) is zero.
-        RangeError: The fraction is negative or not a number.
-        UnstableError: x does not decay.
-    """
-    return x.time_to_level(fraction * abs(onset_value(x)))
-
-
 def predict_stop(x: ExponentialSum, load_factor: float, max_error: float = 0.0) -> Stop:
     """Return when a body comes to rest whose load dies away with x(t) / x(0).
 

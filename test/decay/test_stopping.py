@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from limit_surface_ros.decay.exponential_sum import ExponentialSum
-from limit_surface_ros.decay.stopping import onset_value, predict_stop, time_to_fraction
+from limit_surface_ros.decay.stopping import predict_stop
 from limit_surface_ros.errors import NoOnsetError, NotFiniteError, RangeError, UnstableError
 
 seeds = st.integers(min_value=0, max_value=2**32 - 1)
@@ -107,12 +107,6 @@ def test_any_response_within_the_error_bound_stops_between_earliest_and_latest(
 
 def test_an_error_as_large_as_the_level_leaves_the_end_open():
     assert predict_stop(ExponentialSum([-1.0], [1.0]), 4.0, 0.25).latest == math.inf
-
-
-def test_time_to_fraction_counts_from_the_onset_value():
-    x = ExponentialSum([-2.0], [-5.0])
-    assert time_to_fraction(x, 0.1) == pytest.approx(math.log(10.0) / 2.0, abs=1e-12)
-    assert onset_value(x) == -5.0
 
 
 @pytest.mark.parametrize("coefficients", [[1.0, -1.0], [1.0, -1.0 + 1e-14]])

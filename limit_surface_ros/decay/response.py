@@ -1,0 +1,106 @@
+"""One onset's response: a decay model scaled to an onset, and corrected by what is measured.
+
+Measurements come and predictions go as fractions of the onset, x(t) / x(0) with the x(0) of the
+model as it was fitted, so that a response of another amplitude than the onset's is learnt too.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from limit_surface_ros.checks import as_floats
+from limit_surface_ros.decay.estimation import CoefficientEstimator
+from limit_surface_ros.decay.stopping import onset_value
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.decay.estimation import EstimationOptions
+    from limit_surface_ros.decay.exponential_sum import ExponentialSum
+
+# Of the estimate, in bounds.
+STANDARD_DEVIATIONS = 3.0
+
+
+class Response:
+    """How one load dies away after its onset.
+
+    Args:
+        model: The decay model as it was fitted.
+        max_error: Its largest error, in the unit of x.
+        options: How far measurements are trusted over it; `noise` as a fraction of the onset.
+
+    Attributes:
+        start: x(0) of the model as it was fitted.
+
+    Raises:
+        NoOnsetError: x(0) is zero.
+    """
+
+    def __init__(
+        self, model: ExponentialSum, max_error: float, options: EstimationOptions
+    ) -> None:
+        """Start with the model as it was fitted."""
+        self.start = onset_value(model)
+        self._model = model
+        self._max_error = max_error
+        # A sample departs from any sum of these exponentials by noise and by the fit's error.
+        noise = math.hypot(options.noise * abs(self.start), max_error)
+        self._options = replace(options, noise=noise)
+        self.forget()
+
+    @property
+    def x(self) -> ExponentialSum:
+        """The present model."""
+        return self._estimator.x
+
+    @property
+    def samples(self) -> int:
+        """Number of measurements that count in it."""
+        return self._estimator.accepted
+
+    @property
+    def residual(self) -> float:
+        """Last measured fraction minus its prediction; NaN before the first."""
+        return self._estimator.residual / self.start
+
+    def fractions(self, times: ArrayLike) -> Floats:
+        """Return what is left of the onset at given times [s], each >= 0."""
+        fractions: Floats = self.x(times) / self.start
+        return fractions
+
+    def bounds(self, times: ArrayLike) -> Floats:
+        """Return the largest error that is to be expected at given times, in the unit of x.
+
+        The fit's error, and after corrections three standard deviations of the estimate as well.
+        """
+        t = as_floats("times", times)
+        if not self.samples:
+            return np.full(t.shape, self._max_error)
+        return self._max_error + STANDARD_DEVIATIONS * self._estimator.spread(t)
+
+    def time_to_fraction(self, fraction: float) -> float:
+        """Return the time [s] from which on no more than a fraction of the onset is left."""
+        return self.x.time_to_level(fraction * abs(self.start))
+
+    def learn(self, time: float, fraction: float) -> bool:
+        """Correct the coefficients by a measurement; False if it is an outlier.
+
+        Args:
+            time: Time after the onset [s], later than that of the measurement before.
+            fraction: What was left of the onset.
+
+        Raises:
+            NotFiniteError: A number is NaN or infinite.
+            RangeError: The time is before the onset or not after that of the measurement before.
+        """
+        return self._estimator.add(time, fraction * self.start)
+
+    def forget(self) -> None:
+        """Return to the model as it was fitted, as when time itself was set back."""
+        self._estimator = CoefficientEstimator(self._model, self._options)
