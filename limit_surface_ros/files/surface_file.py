@@ -2,9 +2,9 @@
 
 Keys: `schema: 1`, `name`, `kind`, `frame_id`, `reference_point` [m], `characteristic_length` [m],
 `friction_force` [N], `normal_force` [N] (optional), `fit` (how the model came about; free), and
-last the numbers that define the kind: `terms`, `exponents` and `matrices` of a power_sum, `points`
-and `friction_limits` of point_contacts. Because these come last and are counted, a file cut short
-anywhere is refused.
+last the numbers that define the kind: `terms`, `exponents` and `matrices` of a power_sum, `terms`
+and `matrices` of a dissipation, `points` [m] and `friction_limits` [N] of point_contacts. Because
+these come last and are counted, a file cut short anywhere is refused.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from limit_surface_ros.checks import as_positive
 from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.yaml_reader import Section, place_errors, read_yaml, write_yaml
+from limit_surface_ros.surface.dissipation import Dissipation
 from limit_surface_ros.surface.point_contacts import PointContacts
 from limit_surface_ros.surface.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
@@ -72,6 +73,10 @@ def _read_power_sum(section: Section, scaling: Scaling) -> LimitSurface:
     return PowerSum(matrices, section.array("exponents", (len(matrices),)), scaling)
 
 
+def _read_dissipation(section: Section, scaling: Scaling) -> LimitSurface:
+    return Dissipation(_counted_matrices(section), scaling)
+
+
 def _read_point_contacts(section: Section, scaling: Scaling) -> LimitSurface:
     points = section.array("points", (None, 2))
     return PointContacts(points, section.array("friction_limits", (len(points),)), scaling)
@@ -79,11 +84,13 @@ def _read_point_contacts(section: Section, scaling: Scaling) -> LimitSurface:
 
 _READERS: dict[str, Callable[[Section, Scaling], LimitSurface]] = {
     "power_sum": _read_power_sum,
+    "dissipation": _read_dissipation,
     "point_contacts": _read_point_contacts,
 }
 # What defines each kind, in the order of the file.
 _DEFINING = {
     "power_sum": ("exponents", "matrices"),
+    "dissipation": ("matrices",),
     "point_contacts": ("points", "friction_limits"),
 }
 

@@ -9,6 +9,7 @@ from limit_surface_ros.files.surface_file import (
     read_surface_model,
     write_surface_model,
 )
+from limit_surface_ros.surface.dissipation import Dissipation
 from limit_surface_ros.surface.point_contacts import PointContacts
 from limit_surface_ros.surface.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
@@ -25,6 +26,7 @@ def surfaces():
     scaling = Scaling(0.1 / 3, 7.0 / 3)
     return [
         PowerSum(random_matrices(3), [1.0, 2 / 3, 1 / 3], scaling),
+        Dissipation(random_matrices(2), scaling),
         PointContacts(RNG.normal(size=(3, 2)), [0.5, 0.1, 1 / 3], scaling),
     ]
 
