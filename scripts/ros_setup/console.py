@@ -79,9 +79,12 @@ class _Progress:
         self._last = started
 
     def update(self, line: str) -> None:
+        """Show the line if it is time for a sign of life."""
         now = time.monotonic()
         if now - self._last < (0.1 if self._redraw else PROGRESS_INTERVAL):
             return
+        if line.startswith(("WARNING", "DEPRECATION")):
+            return  # kept in the log, and worrying without need here
         self._last = now
         text = f"  {now - self._started:4.0f} s  {line.strip()[:64]}"
         print(f"\r\033[K{text}" if self._redraw else text, end="", file=sys.stderr, flush=True)
@@ -89,5 +92,6 @@ class _Progress:
             print(file=sys.stderr, flush=True)
 
     def clear(self) -> None:
+        """Leave the terminal's line empty."""
         if self._redraw:
             print("\r\033[K", end="", file=sys.stderr, flush=True)
