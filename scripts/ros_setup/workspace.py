@@ -63,6 +63,7 @@ def build(root: Path, python: Path, env: Mapping[str, str]) -> None:
     if not stale:
         return
     for package in stale:
+        (root / "install" / package.name / STAMP).unlink(missing_ok=True)
         for place in ("install", "build"):
             shutil.rmtree(root / place / package.name, ignore_errors=True)
     names = [package.name for package in stale]
