@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 # Cells into which `time_to_level` cuts an interval at each level of its search.
 SEARCH_CELLS = 128
+# Exponentials that are evaluated at a time.
+BLOCK = 1 << 18
 
 
 def as_rates(rates: ArrayLike) -> Complexes:
@@ -257,9 +259,14 @@ class ExponentialSum:
         return ExponentialSum(self.rates[chosen], self.coefficients[chosen])
 
     def _at(self, times: Floats) -> Floats:
-        waves = np.exp(np.multiply.outer(times, self.rates))
-        values: Floats = (waves @ self.coefficients).real
-        return values
+        flat = times.reshape(-1)
+        values = np.empty(flat.shape)
+        # In blocks: the waves of a million times at once would be a gigabyte.
+        step = max(1, BLOCK // len(self.rates))
+        for start in range(0, len(flat), step):
+            waves = np.exp(np.multiply.outer(flat[start : start + step], self.rates))
+            values[start : start + step] = (waves @ self.coefficients).real
+        return values.reshape(times.shape)
 
     def _require_decay(self) -> None:
         if not self.slowest_rate < 0.0:

@@ -3,6 +3,7 @@
 import math
 import subprocess
 import sys
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -117,6 +118,19 @@ def test_one_time_gives_one_value_and_many_keep_their_shape():
     x = ExponentialSum([-1.0], [1.0])
     assert x(0.5).shape == ()
     assert x(np.zeros((2, 3))).shape == (2, 3)
+
+
+def test_a_million_times_need_no_more_memory_than_their_values():
+    x = random_sum(5, most=6)
+    t = np.linspace(0.0, 5.0, 1_000_001)
+    tracemalloc.start()
+    values = x(t)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 3 * values.nbytes
+    some = t[::99_991]
+    one_by_one = [float(x(time)) for time in some]
+    np.testing.assert_allclose(values[::99_991], one_by_one, rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize(
