@@ -65,7 +65,12 @@ class PiecewisePolynomial:
 
     @classmethod
     def from_samples(
-        cls, times: ArrayLike, values: ArrayLike, edges: ArrayLike, degree: int
+        cls,
+        times: ArrayLike,
+        values: ArrayLike,
+        edges: ArrayLike,
+        degree: int,
+        spread: float = 0.0,
     ) -> PiecewisePolynomial:
         """Fit each cell to the samples strictly inside it, in the 2-norm.
 
@@ -74,6 +79,8 @@ class PiecewisePolynomial:
             values: Shape (n,).
             edges: Shape (cells + 1,) [s], where the function may jump or have a kink.
             degree: Degree of each polynomial.
+            spread: Samples closer than this to an edge [s] are left out: what happens at the
+                edge is spread over them.
 
         Raises:
             ShapeError: An array has the wrong shape.
@@ -93,7 +100,8 @@ class PiecewisePolynomial:
         for left, right in pairwise(bounds):
             # A sample on an edge belongs to neither side: the function may jump there.
             margin = 1e-9 * (right - left)
-            inside = (t > left + margin) & (t < right - margin)
+            reach = max(spread - margin, margin)
+            inside = (t >= left + reach) & (t <= right - reach)
             if np.count_nonzero(inside) <= degree:
                 raise DataError(
                     f"the cell from {left:g} s to {right:g} s holds {np.count_nonzero(inside)} "
@@ -215,6 +223,22 @@ class PiecewisePolynomial:
         sizes = halves * np.sqrt(2.0 * squares)
         largest = np.exp(np.maximum(-rate * self.edges[:-1], -rate * self.edges[1:]))
         return float(sizes @ largest)
+
+    def variation_transform(self, rate: float) -> float:
+        """Return an upper bound on |lambda| |transform(lambda)| for Re lambda = rate.
+
+        Integration by parts: the jumps at the edges and the derivative inside the cells, each
+        with its absolute value.
+        """
+        halves = 0.5 * np.diff(self.edges)
+        ends = self.coefficients.sum(axis=1)
+        starts = self.coefficients @ (-1.0) ** np.arange(self.degree + 1)
+        jumps = np.abs(np.append(starts, 0.0) - np.append(0.0, ends))
+        bound = float(jumps @ np.exp(-rate * self.edges))
+        if self.degree:
+            slopes = legendre.legder(self.coefficients, axis=1) / halves[:, np.newaxis]
+            bound += PiecewisePolynomial(self.edges, slopes).absolute_transform(rate)
+        return bound
 
 
 @lru_cache(maxsize=256)

@@ -1,0 +1,154 @@
+"""Coefficients of a sum of exponentials on fixed rates, in the norm of the analyst's choice.
+
+The rates stay as they are: more terms need a new linear fit and nothing else.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+from scipy import optimize
+
+from limit_surface_ros.checks import as_floats
+from limit_surface_ros.decay.exponential_sum import ExponentialSum, as_rates, real_basis
+from limit_surface_ros.decay.minimax import orthonormal_basis, solve_minimax
+from limit_surface_ros.errors import RangeError, ShapeError, SolverError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from limit_surface_ros.checks import Floats
+
+Criterion: TypeAlias = Callable[["Floats"], float]
+NORMS = ("inf", "2", "1")
+
+
+@dataclass(frozen=True)
+class CoefficientFit:
+    """Coefficients fitted to samples.
+
+    Attributes:
+        sum: The fitted sum.
+        norm: "inf", "2", "1" or the criterion's name.
+        value: Value of the weighted norm, or the criterion, at the fit.
+        lower_bound: No coefficients give a smaller value; NaN for a criterion of one's own.
+        max_error: Largest |sum - x| on the samples, without weights.
+    """
+
+    sum: ExponentialSum
+    norm: str
+    value: float
+    lower_bound: float
+    max_error: float
+
+
+def fit_coefficients(
+    rates: ArrayLike,
+    times: ArrayLike,
+    values: ArrayLike,
+    norm: str | Criterion = "inf",
+    weights: ArrayLike | None = None,
+) -> CoefficientFit:
+    """Fit the coefficients of exponentials with the given rates to samples.
+
+    Args:
+        rates: Shape (m,), complex [1/s], one of each conjugate pair (Im >= 0).
+        times: Shape (n,), >= 0 [s].
+        values: Shape (n,), x at the times.
+        norm: "inf" (largest error, certified by a dual bound), "2", "1", or a function of the
+            weighted errors, shape (n,), that returns what is to be made small. Such a function
+            should be smooth; its minimum is sought from the 2-norm's fit and may be local.
+        weights: Shape (n,), above 0, by which the errors are multiplied; 1 if not given.
+
+    Raises:
+        ShapeError: The arrays do not belong together.
+        NotFiniteError: A number is NaN or infinite.
+        RangeError: A rate has Im < 0, a time is negative, a weight is not above 0, or the norm is
+            not known.
+        SolverError: The solution could not be certified.
+    """
+    lambdas = as_rates(rates)
+    t, x = as_floats("times", times), as_floats("values", values)
+    if t.ndim != 1 or t.shape != x.shape or len(t) == 0:
+        raise ShapeError(f"times and values must have one shape (n,), got {t.shape} and {x.shape}")
+    if (t < 0.0).any():
+        raise RangeError(f"times must be at least 0, got {float(t.min())}")
+    w = np.ones(len(t)) if weights is None else as_floats("weights", weights)
+    if w.shape != t.shape or not (w > 0.0).all():
+        raise RangeError("weights must hold one number above 0 for each sample")
+    basis = real_basis(lambdas, t)
+    solution, value, bound = solve(basis * w[:, np.newaxis], x * w, norm)
+    name = norm if isinstance(norm, str) else getattr(norm, "__name__", "criterion")
+    error = float(np.abs(basis @ solution - x).max())
+    return CoefficientFit(
+        ExponentialSum.from_weights(lambdas, solution), name, value, bound, error
+    )
+
+
+def solve(matrix: Floats, target: Floats, norm: str | Criterion) -> tuple[Floats, float, float]:
+    """Return c that makes matrix @ c - target small, its value and a lower bound on any value.
+
+    Raises:
+        RangeError: The norm is not known.
+        SolverError: The solution could not be certified.
+    """
+    if callable(norm):
+        return _minimise(matrix, target, norm)
+    if norm == "inf":
+        best = solve_minimax(matrix, target)
+        return best.weights, best.value, best.lower_bound
+    if norm == "2":
+        solution = _least_squares(matrix, target)
+        value = float(np.linalg.norm(matrix @ solution - target))
+        return solution, value, value
+    if norm == "1":
+        return _least_absolute(matrix, target)
+    raise RangeError(f"norm must be one of {', '.join(NORMS)} or a function, got {norm!r}")
+
+
+def _least_squares(matrix: Floats, target: Floats) -> Floats:
+    basis = orthonormal_basis(matrix)
+    solution: Floats = basis.back @ (basis.columns.T @ target)
+    return solution
+
+
+def _least_absolute(matrix: Floats, target: Floats) -> tuple[Floats, float, float]:
+    """Solve the dual, max b'y with Q'y = 0 and |y| <= 1; its multipliers are the coefficients."""
+    basis = orthonormal_basis(matrix)
+    scale = float(np.abs(target).max(initial=0.0)) or 1.0
+    rank = basis.columns.shape[1]
+    result = optimize.linprog(
+        -target / scale,
+        A_eq=basis.columns.T,
+        b_eq=np.zeros(rank),
+        bounds=(-1.0, 1.0),
+        method="highs",
+    )
+    if result.x is None:
+        raise SolverError(f"the fit in the 1-norm failed: {result.message}")
+    solution = basis.back @ (-result.eqlin.marginals * scale)
+    value = float(np.abs(matrix @ solution - target).sum())
+    # The dual made feasible exactly proves the bound whatever the solver's tolerances.
+    dual = result.x - basis.columns @ (basis.columns.T @ result.x)
+    bound = float(dual @ target) / max(1.0, float(np.abs(dual).max()))
+    if value - bound > 1e-6 * value + 1e-10 * scale * len(target):
+        raise SolverError(f"the 1-norm could not be certified: value {value:g}, bound {bound:g}")
+    return solution, value, bound
+
+
+def _minimise(matrix: Floats, target: Floats, criterion: Criterion) -> tuple[Floats, float, float]:
+    basis = orthonormal_basis(matrix)
+    columns = basis.columns
+
+    def value_of(c: Floats) -> float:
+        value = float(criterion(columns @ c - target))
+        if not math.isfinite(value):
+            raise RangeError(f"the criterion must return a finite number, got {value}")
+        return value
+
+    result = optimize.minimize(value_of, columns.T @ target, method="BFGS")
+    return basis.back @ result.x, float(result.fun), math.nan

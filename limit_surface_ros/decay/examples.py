@@ -1,0 +1,96 @@
+"""Named examples of decaying responses.
+
+The thesis does not print its second and third function; those here show the same numbers of
+impulses (four and three, one of them at 0). The fourth is not minimum-phase.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from limit_surface_ros.decay.delay_system import DelaySystem, from_quasi_polynomial
+from limit_surface_ros.decay.responses import Analytic, PiecewiseLinear, Response
+from limit_surface_ros.errors import RangeError
+
+# Highest power of lambda first; row k stands before exp(-k lambda).
+THESIS_EQUATION = (
+    (-1.0, -0.997, -0.9956, -0.992, -1.0152, -0.828, -1.644),
+    (1.0, 1.991, 2.9827, 3.9568, 5.0604, 4.7976, 9.54),
+    (0.0, -0.9911, -2.9744, -5.9014, -10.0308, -11.412, -22.656),
+    (0.0, -0.0168, 0.9617, 3.8512, 9.7878, 14.0472, 27.852),
+    (0.0, -0.0186, -0.0195, -0.9356, -4.6128, -9.144, -18.036),
+    (0.0, 0.1547, 0.1543, 0.085, 0.7254, 2.5824, 5.076),
+    (0.0, -0.0841, -0.0705, -0.0344, 0.0672, 0.1848, -0.132),
+)
+
+
+def hockey_stick() -> PiecewiseLinear:
+    """Return f1: 1 - t up to t = 1 s, then 0; impulses at 0 and 1 s."""
+    return PiecewiseLinear(np.array([0.0, 1.0]), np.array([1.0, 0.0]))
+
+
+def four_impulses() -> PiecewiseLinear:
+    """Return f2, with kinks at 0.5, 1 and 1.5 s."""
+    return PiecewiseLinear(np.array([0.0, 0.5, 1.0, 1.5]), np.array([1.0, 0.5, 0.2, 0.0]))
+
+
+def three_impulses() -> PiecewiseLinear:
+    """Return f3, with kinks at 1 and 1.5 s; its delay system has a slow pair of roots."""
+    return PiecewiseLinear(np.array([0.0, 1.0, 1.5]), np.array([1.0, 0.8, 0.0]))
+
+
+def undershoot() -> PiecewiseLinear:
+    """Return f4, which undershoots: not minimum-phase, so that its delay system is unstable."""
+    return PiecewiseLinear(np.array([0.0, 0.5, 1.0]), np.array([1.0, -0.6, 0.0]))
+
+
+def kink_with_tail() -> Analytic:
+    """Return a hockey stick on an exponential tail: 0.8 (1 - t) + 0.2, then 0.2 exp(-(t-1)/2)."""
+    return Analytic(
+        lambda t: np.maximum(0.8 * (1.0 - t), 0.0) + 0.2 * np.exp(-0.5 * np.maximum(t - 1.0, 0.0)),
+        np.array([1.0]),
+    )
+
+
+def gaussian() -> Analytic:
+    """Return exp(-t^2)."""
+    return Analytic(lambda t: np.exp(-(t**2)))
+
+
+def power_law() -> Analytic:
+    """Return 1 / (1 + t)^2."""
+    return Analytic(lambda t: 1.0 / (1.0 + t) ** 2)
+
+
+EXAMPLES: dict[str, Callable[[], Response]] = {
+    "f1": hockey_stick,
+    "f2": four_impulses,
+    "f3": three_impulses,
+    "f4": undershoot,
+    "tail": kink_with_tail,
+    "gaussian": gaussian,
+    "power_law": power_law,
+}
+
+
+def example(name: str) -> Response:
+    """Return the named example.
+
+    Raises:
+        RangeError: No example has that name; the error lists them.
+    """
+    if name not in EXAMPLES:
+        raise RangeError(f"no example {name!r}; there are {', '.join(EXAMPLES)}")
+    return EXAMPLES[name]()
+
+
+def thesis_system() -> DelaySystem:
+    """Return the delay system of the hockey stick as the thesis prints it (2.4): basis 1."""
+    return from_quasi_polynomial(THESIS_EQUATION)
+
+
+def simple_system() -> DelaySystem:
+    """Return xdot(t) = -0.1 x(t - 6): basis 0 of the thesis."""
+    return DelaySystem(np.array([6.0]), np.array([-0.1]))

@@ -1,0 +1,151 @@
+"""One call from a response to a decay model: choose rates by a method, then fit coefficients."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from limit_surface_ros.checks import as_positive
+from limit_surface_ros.decay.rate_choice import RateChoice
+from limit_surface_ros.decay.rates_dde import dde_rates
+from limit_surface_ros.decay.rates_esprit import esprit_rates
+from limit_surface_ros.decay.rates_neutral import neutral_rates
+from limit_surface_ros.decay.rates_polished import polished_rates
+from limit_surface_ros.decay.response_fits import ResponseFit, fit_response
+from limit_surface_ros.errors import LimitSurfaceError, RangeError, SolverError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from limit_surface_ros.decay.coefficient_fits import Criterion
+    from limit_surface_ros.decay.responses import Response
+
+METHODS = ("dde", "neutral", "esprit", "polished", "best")
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class DecayFit:
+    """A fitted decay model and how it came about.
+
+    Attributes:
+        choice: The rates, their method and what the method chose.
+        fit: The coefficients and their errors.
+        seconds: Time it took [s].
+    """
+
+    choice: RateChoice
+    fit: ResponseFit
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Options:
+    """Choices that only some methods look at.
+
+    Attributes:
+        max_delay: Maximum delay of the delay system [s]; found by trial fits if None.
+        degree: Degree of the kernel's polynomial pieces; a default of the construction if None.
+        allow_unstable: Go on with responses that are not minimum-phase (method dde).
+        tail_rates: Known complex rates of the response's tail (method neutral), or None.
+    """
+
+    max_delay: float | None = None
+    degree: int | None = None
+    allow_unstable: bool = False
+    tail_rates: ArrayLike | None = None
+
+
+def fit_decay(
+    response: Response,
+    terms: int,
+    end: float,
+    method: str = "best",
+    norm: str | Criterion = "inf",
+    options: Options | None = None,
+    progress: Progress | None = None,
+) -> DecayFit:
+    """Approximate a response on [0, end] by a sum of exponentials.
+
+    Args:
+        response: The response.
+        terms: Number of real terms, a conjugate pair counting two; the fit may have fewer.
+        end: End of the interval [s].
+        method: How rates are chosen: "dde" (characteristic roots of the response's own delay
+            system, the thesis), "neutral" (closed-form roots), "esprit" (from samples),
+            "polished" (ESPRIT's rates, then moved to reduce the error), or "best" (the best of
+            neutral and esprit, polished).
+        norm: In which norm the coefficients are fitted, see `coefficient_fits`. Rates are always
+            chosen by the infinity norm.
+        options: Choices for single methods.
+        progress: Called with a line of text when there is something to tell.
+
+    Raises:
+        RangeError: A number or a name is out of range.
+        UnstableError: The method is dde and the response's delay system would be unstable.
+        DataError: The response cannot support the method.
+        SolverError: A result could not be certified.
+    """
+    span = as_positive("end", end)
+    if terms < 1:
+        raise RangeError(f"terms must be at least 1, got {terms}")
+    if method not in METHODS:
+        raise RangeError(f"method must be one of {', '.join(METHODS)}; got {method!r}")
+    chosen = options or Options()
+    tell = progress or (lambda line: None)
+    start = time.perf_counter()
+    choice = _choose(response, terms, span, method, chosen, tell)
+    fit = fit_response(choice.rates, response, span, norm)
+    return DecayFit(choice, fit, time.perf_counter() - start)
+
+
+def _choose(
+    response: Response, terms: int, end: float, method: str, options: Options, tell: Progress
+) -> RateChoice:
+    if method == "dde":
+        choice = dde_rates(
+            response, terms, end, options.max_delay, options.degree, options.allow_unstable
+        )
+    elif method == "neutral":
+        choice = neutral_rates(response, terms, end, options.tail_rates)
+    elif method == "esprit":
+        choice = esprit_rates(response, terms, end)
+    elif method == "polished":
+        choice = _polish(
+            response, end, _choose(response, terms, end, "esprit", options, tell), tell
+        )
+    else:
+        return _best(response, terms, end, options, tell)
+    tell(f"{method}: {len(choice.rates)} rates, error {choice.error:.4g}")
+    return choice
+
+
+def _best(
+    response: Response, terms: int, end: float, options: Options, tell: Progress
+) -> RateChoice:
+    """Polish each closed or sampled choice and keep the best; none of them can spoil it."""
+    choices: list[RateChoice] = []
+    failure: LimitSurfaceError | None = None
+    for method in ("esprit", "neutral"):
+        try:
+            choice = _choose(response, terms, end, method, options, tell)
+            choices.append(choice)
+            choices.append(_polish(response, end, choice, tell))
+        except LimitSurfaceError as error:
+            failure = error
+            tell(f"{method}: {error}")
+    if not choices:
+        raise SolverError(f"no method found rates; the last said: {failure}")
+    return min(choices, key=lambda choice: choice.error)
+
+
+def _polish(response: Response, end: float, start: RateChoice, tell: Progress) -> RateChoice:
+    def each_step(step: int, error: float) -> None:
+        if step % 10 == 0:
+            tell(f"polishing {start.method}: step {step}, error {error:.4g}")
+
+    choice = polished_rates(response, end, start, each_step)
+    tell(f"polished {start.method}: error {choice.error:.4g}")
+    return choice

@@ -1,0 +1,129 @@
+"""Rates from samples alone: ESPRIT [1], the matrix pencil [2] of the dominant subspace.
+
+The samples' Hankel matrix has the rank of the number of exponentials; its dominant left singular
+vectors, shifted by one sample, give the rates as eigenvalues.
+
+[1] R. Roy, T. Kailath, ESPRIT - estimation of signal parameters via rotational invariance
+    techniques, IEEE Trans. Acoust., Speech, Signal Process. 37, 984-995, 1989,
+    doi 10.1109/29.32276.
+[2] Y. Hua, T. K. Sarkar, Matrix pencil method for estimating parameters of exponentially damped /
+    undamped sinusoids in noise, IEEE Trans. Acoust., Speech, Signal Process. 38, 814-824, 1990,
+    doi 10.1109/29.56027.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import linalg
+
+from limit_surface_ros.checks import as_floats, as_positive
+from limit_surface_ros.decay.rate_choice import RateChoice, judged, take
+from limit_surface_ros.decay.responses import uniform_times
+from limit_surface_ros.decay.smoothing import settling_time
+from limit_surface_ros.errors import DataError, RangeError, ShapeError, SolverError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.decay.exponential_sum import Complexes
+    from limit_surface_ros.decay.responses import Response
+
+SAMPLES = 1001
+# Singular values below this fraction of the largest are rounding; rates made of them are noise.
+RANK_TOLERANCE = 1e-13
+# Windows tried, in settling times of the response, beside the whole interval.
+WINDOWS = (2.0, 6.0)
+# Rates that ESPRIT leaves undamped are given this much decay over the interval.
+LEAST_DECAY = 1e-3
+
+
+def esprit(values: ArrayLike, step: float, terms: int) -> Complexes:
+    """Return the rates of exponentials that make up uniform samples.
+
+    Args:
+        values: Shape (n,), n >= 3.
+        step: Distance of the samples [s].
+        terms: Number of real terms; fewer are returned where the samples have not that rank.
+
+    Returns:
+        Shape (m,), one of each conjugate pair, slowest first [1/s].
+
+    Raises:
+        ShapeError: There are fewer than three samples, or fewer than twice the terms.
+        NotFiniteError: A sample is NaN or infinite.
+        RangeError: The step is not above 0, or terms is below 1.
+    """
+    x, dt = as_floats("values", values), as_positive("step", step)
+    if terms < 1:
+        raise RangeError(f"terms must be at least 1, got {terms}")
+    if x.ndim != 1 or len(x) < max(3, 2 * terms):
+        raise ShapeError(f"{terms} terms need at least {max(3, 2 * terms)} samples, got {x.shape}")
+    half = (len(x) + 1) // 2
+    # Square and real, the Hankel matrix is symmetric: its eigenvectors are the singular vectors.
+    hankel = linalg.hankel(x[:half], x[half - 1 : 2 * half - 1])
+    eigenvalues, vectors = linalg.eigh(hankel, check_finite=False)
+    order = np.argsort(-np.abs(eigenvalues))
+    sizes = np.abs(eigenvalues[order])
+    rank = min(terms, int(np.count_nonzero(sizes > RANK_TOLERANCE * sizes[0])), half - 1)
+    subspace = vectors[:, order[:rank]]
+    shift, *_ = linalg.lstsq(subspace[:-1], subspace[1:], check_finite=False)
+    multipliers = np.asarray(linalg.eigvals(shift), dtype=np.complex128)
+    # A negative real multiplier changes sign with each sample: no function of time does that.
+    usable = (multipliers.imag > 0.0) | ((multipliers.imag == 0.0) & (multipliers.real > 0.0))
+    rates: Complexes = np.log(multipliers[usable]) / dt
+    return rates[np.argsort(-rates.real, kind="stable")]
+
+
+def esprit_rates(
+    response: Response, terms: int, end: float, window: float | None = None
+) -> RateChoice:
+    """Return ESPRIT's rates of a response, from the window that gives the least error.
+
+    Args:
+        response: The response.
+        terms: Number of real terms.
+        end: End of the interval on which the rates are judged [s].
+        window: The response is sampled on [0, window] [s]; several are tried if not given.
+
+    Raises:
+        RangeError: A number is out of range.
+        SolverError: No window gives usable rates.
+    """
+    if terms < 1:
+        raise RangeError(f"terms must be at least 1, got {terms}")
+    settled = settling_time(response, end)
+    windows = sorted({min(factor * settled, end) for factor in WINDOWS} | {end})
+    if window is not None:
+        windows = [as_positive("window", window)]
+    choices: list[RateChoice] = []
+    for length in windows:
+        for order in (terms, terms - 1):
+            # An even order may come out as pairs only where an odd one has a real rate.
+            if order < 1 or (order < terms and len(choices)):
+                continue
+            times = _times(response, length, max(SAMPLES, 8 * terms))
+            rates = damped(esprit(response(times), float(times[1]), order), end)
+            rates = take(rates, terms)
+            if len(rates) == 0:
+                continue
+            choices.append(judged(rates, response, end, "esprit", None, {"window": length}))
+    if not choices:
+        raise SolverError("ESPRIT found no usable rate in this response")
+    return min(choices, key=lambda choice: choice.error)
+
+
+def damped(rates: Complexes, end: float) -> Complexes:
+    """Return the rates with undamped or growing ones made to decay a little by `end`."""
+    decay = np.minimum(rates.real, -LEAST_DECAY / end)
+    result: Complexes = decay + 1j * rates.imag
+    return result
+
+
+def _times(response: Response, length: float, samples: int) -> Floats:
+    try:
+        return uniform_times(length, samples, response.breakpoints[:12], stretch=2)
+    except DataError:
+        return np.linspace(0.0, length, samples)

@@ -1,0 +1,160 @@
+"""Free rates: the largest error made smaller by moving rates and coefficients together.
+
+Sequential linear programming: each step linearises the sum in its rates, solves a minimax problem
+and refits the coefficients. A trust region keeps the steps where the linearisation holds; it
+needs no constraints, only more rows, since a minimax solution whose value is below tau
+keeps |tau d / rho| below tau, that is, |d| below rho.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from limit_surface_ros.decay.exponential_sum import (
+    ExponentialSum,
+    coefficients_of_weights,
+    count_terms,
+    real_basis,
+)
+from limit_surface_ros.decay.minimax import solve_minimax
+from limit_surface_ros.decay.rate_choice import RateChoice, judged
+from limit_surface_ros.decay.response_fits import fine_times
+from limit_surface_ros.errors import SolverError
+
+if TYPE_CHECKING:
+    from limit_surface_ros.checks import Bools, Floats
+    from limit_surface_ros.decay.exponential_sum import Complexes
+    from limit_surface_ros.decay.responses import Response
+
+MOST_STEPS = 100
+# Polishing ends when this many steps in a row gained less than this part of the error.
+STALL, LEAST_GAIN = 6, 1e-3
+LEAST_RADIUS = 1e-5
+# Rates are kept left of this many decays over the interval.
+LEAST_DECAYS = 0.4
+# Most refits of the coefficients until no point of the fine grid is worse than those seen.
+ROUNDS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    rates: Complexes
+    weights: Floats
+    error: float
+
+
+def polished_rates(
+    response: Response,
+    end: float,
+    start: RateChoice,
+    progress: Callable[[int, float], None] | None = None,
+) -> RateChoice:
+    """Return rates near those of another choice with a smaller largest error on [0, end].
+
+    Args:
+        response: The response.
+        end: End of the interval [s].
+        start: Rates to start from; the result is never worse.
+        progress: Called after each step with its number and the error so far.
+
+    Raises:
+        SolverError: Not even the start could be fitted.
+    """
+    problem = _Problem(response, end, start.rates)
+    point = problem.fitted(start.rates)
+    radius, stalled, steps = 0.3, 0, 0
+    while steps < MOST_STEPS and radius > LEAST_RADIUS and stalled < STALL:
+        steps += 1
+        try:
+            trial, predicted = problem.step(point, radius)
+        except SolverError:
+            radius *= 0.25
+            continue
+        gain, hope = point.error - trial.error, point.error - predicted
+        if hope <= 1e-4 * point.error:
+            break
+        if gain > 0.0:
+            stalled = 0 if gain > LEAST_GAIN * point.error else stalled + 1
+        radius *= 2.0 if gain > 0.6 * hope else 1.0 if gain > 0.2 * hope else 0.4
+        radius = min(radius, 1.0)
+        if gain > 0.0:
+            point = trial
+        if progress is not None:
+            progress(steps, point.error)
+    parameters = {**start.parameters, "start": start.method, "steps": float(steps)}
+    choice = judged(point.rates, response, end, "polished", None, parameters)
+    if choice.error < start.error:
+        return choice
+    return RateChoice(start.rates, "polished", start.error, start.system, parameters)
+
+
+class _Problem:
+    """A response on a fine grid, of which each step sees the points that matter."""
+
+    def __init__(self, response: Response, end: float, rates: Complexes) -> None:
+        fastest = float(np.abs(rates.imag).max())
+        self.times = fine_times(response, end, fastest)
+        self.target = response(self.times)
+        self.scale = float(np.abs(self.target).max())
+        self.least_decay = LEAST_DECAYS / end
+        self.base = np.zeros(len(self.times), dtype=bool)
+        self.base[:: max(1, len(self.times) // max(300, 6 * count_terms(rates)))] = True
+        self.seen = self.base
+
+    def fitted(self, rates: Complexes) -> _Point:
+        """Return the rates with minimax coefficients, refitted until the fine grid agrees."""
+        basis = real_basis(rates, self.times)
+        for _ in range(ROUNDS):
+            solution = solve_minimax(basis[self.seen], self.target[self.seen])
+            errors = np.abs(basis @ solution.weights - self.target)
+            worst = float(errors.max())
+            if worst <= 1.002 * solution.value:
+                break
+            self.seen |= _peaks(errors) & (errors > 0.7 * solution.value)
+        return _Point(rates, solution.weights, worst)
+
+    def step(self, point: _Point, radius: float) -> tuple[_Point, float]:
+        """Return the point after one linear program, and the error that it predicts."""
+        x = ExponentialSum.from_weights(point.rates, point.weights)
+        errors = self.target - x(self.times)
+        peaks = _peaks(np.abs(errors)) & (np.abs(errors) > 0.3 * point.error)
+        seen = self.base | peaks | np.roll(peaks, 2) | np.roll(peaks, -2)
+        self.seen = seen
+        times = self.times[seen]
+        basis = real_basis(point.rates, times)
+        # d/d(lambda) of Re c exp(lambda t) is Re (c t exp(lambda t) dlambda).
+        coefficients = coefficients_of_weights(point.rates, point.weights)
+        waves = np.exp(np.multiply.outer(times, point.rates)) * times[:, np.newaxis] * coefficients
+        is_pair = point.rates.imag != 0.0
+        tangents = np.concatenate([waves.real, -waves.imag[:, is_pair]], axis=1)
+        reach = radius * np.concatenate([_mobility(point.rates), _mobility(point.rates[is_pair])])
+        # In units of its reach each change of a rate is a row that weighs as much as the error.
+        terms, moves = basis.shape[1], tangents.shape[1]
+        matrix = np.zeros((len(times) + moves, terms + moves))
+        matrix[: len(times), :terms] = basis
+        matrix[: len(times), terms:] = tangents * reach
+        matrix[len(times) :, terms:] = point.error * np.eye(moves)
+        target = np.concatenate([errors[seen], np.zeros(moves)])
+        solution = solve_minimax(matrix, target)
+        change = solution.weights[terms:] * reach
+        rates = point.rates + change[: len(point.rates)]
+        rates[is_pair] += 1j * change[len(point.rates) :]
+        rates = np.minimum(rates.real, -self.least_decay) + 1j * np.abs(rates.imag)
+        return self.fitted(rates), solution.value
+
+
+def _mobility(rates: Complexes) -> Floats:
+    """How far a rate may move in a step of radius 1: about as far as it is damped."""
+    mobility: Floats = 0.3 + np.abs(rates.real)
+    return mobility
+
+
+def _peaks(errors: Floats) -> Bools:
+    rising = np.append(True, errors[1:] >= errors[:-1])
+    falling = np.append(errors[:-1] >= errors[1:], True)
+    peaks: Bools = rising & falling
+    return peaks

@@ -1,0 +1,59 @@
+"""Noisy records: how noisy they are, and the piecewise linear response behind them.
+
+A memory kernel differentiates, so that noise of 1 % in the samples drowns it. A linear spline of
+few cells, fitted to all samples, has a kernel that can be trusted, in closed form.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from limit_surface_ros.decay.responses import PiecewiseLinear
+
+if TYPE_CHECKING:
+    from limit_surface_ros.decay.responses import Response
+
+# Fewer samples cannot tell noise from shape.
+LEAST_SAMPLES = 60
+# Noise below this part of the onset is left alone.
+TOLERATED = 5e-4
+CELLS_TO_SETTLE, MOST_CELLS = 4, 36
+
+
+def noise_level(response: Response) -> float:
+    """Return the standard deviation of a record's noise, in the unit of x; 0 if it has none.
+
+    Taken from the median of second differences, in which a smooth or piecewise linear response
+    leaves next to nothing.
+    """
+    if not isinstance(response, PiecewiseLinear) or len(response.knots) < LEAST_SAMPLES:
+        return 0.0
+    bends = np.diff(response.values, 2)
+    # 1.4826 turns a median into a deviation, and a second difference has variance 6.
+    return float(1.4826 * np.median(np.abs(bends)) / np.sqrt(6.0))
+
+
+def settling_time(response: Response, end: float) -> float:
+    """Return the time [s] from which on |x| stays below 1 % of its largest value, or its noise."""
+    times = np.linspace(0.0, end, 4001)
+    sizes = np.abs(response(times))
+    level = max(0.01 * float(sizes.max()), 5.0 * noise_level(response))
+    above = np.flatnonzero(sizes > level)
+    return float(times[min(above[-1] + 1, len(times) - 1)]) if len(above) else end
+
+
+def smoothed(response: Response, end: float) -> Response:
+    """Return a noisy record on [0, end] as a linear spline of few cells; others as they are."""
+    noise = noise_level(response)
+    if noise <= TOLERATED * abs(float(response(0.0))):
+        return response
+    assert isinstance(response, PiecewiseLinear)
+    cell = max(settling_time(response, end) / CELLS_TO_SETTLE, end / MOST_CELLS)
+    knots = np.linspace(0.0, end, max(2, round(end / cell) + 1))
+    times = response.knots[response.knots <= end]
+    # Each column is the hat function of one knot.
+    hats = np.maximum(0.0, 1.0 - np.abs(times[:, np.newaxis] - knots) / knots[1])
+    values, *_ = np.linalg.lstsq(hats, response.values[: len(times)], rcond=None)
+    return PiecewiseLinear(knots, values)
