@@ -23,7 +23,7 @@ test: ## Run the tests against the built packages (ARGS go to pytest: ARGS="-k n
 	@scripts/with_ros --with test --with extras --isolated -- python3 scripts/run_pytest.py $(ARGS)
 
 lint: ## Check style, types and package descriptions
-	@scripts/with_ros --with lint -- scripts/lint
+	@scripts/with_ros --tools lint -- scripts/lint
 
 docs: ## Build the documentation into docs/_build/html
 	@scripts/with_ros --with docs -- python3 -m sphinx -W --keep-going -q docs docs/_build/html
@@ -33,6 +33,6 @@ bench: ## Measure against named peers, into benchmarks/RESULTS.md (ARGS name som
 	@scripts/with_ros --with bench -- python3 benchmarks/run.py $(ARGS)
 
 clean: ## Remove everything that was installed, built or logged here
-	@rm -rf .venv build install log .mypy_cache .ruff_cache .hypothesis
+	@rm -rf .venv .venv-lint build install log .mypy_cache .ruff_cache .hypothesis
 	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
 	@echo "removed .venv, build, install, log and caches"

@@ -5,11 +5,13 @@ built into `install/`. What is up to date is left alone, so that every command c
 """
 
 import argparse
+import contextlib
 import fcntl
 import os
 import shutil
 import signal
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import needs
@@ -42,6 +44,11 @@ def main() -> int:
         help="also install requirements/NAME.txt (may be given again)",
     )
     parser.add_argument(
+        "--tools",
+        metavar="NAME",
+        help="no ROS at all: only requirements/NAME.txt, in a .venv-NAME of its own",
+    )
+    parser.add_argument(
         "--isolated",
         action="store_true",
         help="run in a ROS domain of its own that only this machine hears",
@@ -54,7 +61,7 @@ def main() -> int:
     parser.add_argument("command", nargs=argparse.REMAINDER, help="program and arguments")
     arguments = parser.parse_args()
     try:
-        env = set_up(arguments.groups)
+        env = set_up_tools(arguments.tools) if arguments.tools else set_up(arguments.groups)
         if arguments.isolated:
             claim = isolate_discovery(env, ROOT / "log" / "ros")
             say(f"running in ROS domain {env['ROS_DOMAIN_ID']}, on this machine only")
@@ -77,6 +84,21 @@ def main() -> int:
     return claim.fileno()
 
 
+def set_up_tools(group: str) -> dict[str, str]:
+    """Install requirements that need no ROS and return the environment to run programs in.
+
+    Raises:
+        SetupError: something is needed that the user has to provide.
+    """
+    needs.check_venv()
+    with locked():
+        env = base_environment(ROOT, system_ros=False)
+        venv = VenvDir(ROOT, system_ros=False, name=f".venv-{group}")
+        venv.fill([group], env)
+    enter_venv(env, venv.path)
+    return env
+
+
 def set_up(groups: list[str]) -> dict[str, str]:
     """Install and build what is missing and return the environment to run programs in.
 
@@ -87,13 +109,7 @@ def set_up(groups: list[str]) -> dict[str, str]:
     if not system_ros:
         needs.check_wheels_exist()
     needs.check_build_tools()
-    lock = os.open(ROOT, os.O_RDONLY)
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        say("waiting for another set-up of this directory to end")
-        fcntl.flock(lock, fcntl.LOCK_EX)
-    try:
+    with locked():
         env = base_environment(ROOT, system_ros)
         venv = VenvDir(ROOT, system_ros)
         python = Path(sys.executable)
@@ -114,10 +130,23 @@ def set_up(groups: list[str]) -> dict[str, str]:
             add_ros_wheels(env, venv.path)
             python = venv.python
         build(ROOT, python, env)
-    finally:
-        os.close(lock)
     add_workspace(ROOT, env)
     return env
+
+
+@contextlib.contextmanager
+def locked() -> Iterator[None]:
+    """Keep other set-ups of this directory waiting."""
+    lock = os.open(ROOT, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            say("waiting for another set-up of this directory to end")
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(lock)
 
 
 if __name__ == "__main__":

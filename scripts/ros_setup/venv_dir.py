@@ -35,12 +35,13 @@ class VenvDir:
     Args:
         root: the repository.
         system_ros: whether the packages of the system are visible inside.
+        name: the directory in `root`.
     """
 
-    def __init__(self, root: Path, system_ros: bool) -> None:
+    def __init__(self, root: Path, system_ros: bool, name: str = ".venv") -> None:
         """Name the place; nothing is made yet."""
         self.root = root
-        self.path = root / ".venv"
+        self.path = root / name
         self.python = self.path / "bin" / "python"
         self._system_ros = system_ros
         self._stamps = self.path / "stamps"
@@ -73,14 +74,14 @@ class VenvDir:
             if "Installing collected packages" not in self._pip_log.read_text(encoding="utf-8"):
                 self._write_stamp("base", base)  # nothing was touched: no network, for example
             raise
-        if not self._system_ros:
+        if "ros" in groups:
             self._mend_cmake_files(env)
         for name, key in {**keys, "base": base}.items():
             self._write_stamp(name, key)
 
     def _make(self, env: Mapping[str, str]) -> None:
         if self.path.exists() or self.path.is_symlink():
-            say("replacing .venv: unfinished, or made at another place or by another Python")
+            say(f"replacing {self.path.name}: unfinished, or made elsewhere or by another Python")
             self._remove_stamp("base")
             if self.path.is_symlink():
                 self.path.unlink()
@@ -90,7 +91,7 @@ class VenvDir:
         run_logged(
             [INTERPRETER, "-I", "-m", "venv", *visible, self.path],
             self._logs / "venv.log",
-            "making .venv",
+            f"making {self.path.name}",
             env,
             self.root,
         )
