@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.surface.dissipation_inverse import DissipationInverse
 from limit_surface_ros.surface.dissipation_terms import FormTerms
+from limit_surface_ros.surface.gauge_inverse import ConvexInverse
 from limit_surface_ros.surface.quadratic_form import root_of
 from limit_surface_ros.surface.scaled_surface import ScaledSurface
 from limit_surface_ros.surface.sphere import even_directions
@@ -52,14 +52,14 @@ class DissipationSurface(ScaledSurface):
         return free
 
     @cached_property
-    def _inverse(self) -> DissipationInverse:
+    def _inverse(self) -> ConvexInverse:
         terms = self._terms
         if len(self._free):
             # A resistance within one norm keeps the least twist at zero along the free motions.
             forms = self.scaled_forms.copy()
             forms[0] += np.trace(forms[0]) * self._free.T @ self._free
             terms = FormTerms(np.array([root_of(form) for form in forms]))
-        return DissipationInverse(terms, even_directions(_STARTS).T)
+        return ConvexInverse(terms, even_directions(_STARTS).T, terms.corners())
 
     def _loads(self, twists: Floats) -> Floats:
         return self._terms.gradient(twists)

@@ -118,18 +118,22 @@ def _newton_moves(
     across_first = (first * gradients).sum(axis=0)
     across_second = (second * gradients).sum(axis=0)
     along = (normals * gradients).sum(axis=0)
-    sines = np.hypot(across_first, across_second) / np.where(along > 0.0, along, 1e-300)
+    rising = along > 0.0
+    sines = np.hypot(across_first, across_second) / np.where(rising, along, 1.0)
+    sines[~rising] = np.inf
     bent_first = np.einsum("ijm,jm->im", hessians, first)
     bent_second = np.einsum("ijm,jm->im", hessians, second)
     a = (first * bent_first).sum(axis=0)
     b = (first * bent_second).sum(axis=0)
     c = (second * bent_second).sum(axis=0)
-    # Where the gauge is flat the answer is not unique and any step will do; where it bends down,
-    # it is made to bend up.
+    # Where the gauge is flat the answer is not unique and any step will do.
     size = np.sqrt((gradients * gradients).sum(axis=0) / (points * points).sum(axis=0))
     mean, spread = 0.5 * (a + c), np.hypot(0.5 * (a - c), b)
     ridge = 1e-15 * spread + 1e-13 * size
-    ridge += np.where(mean < spread * (1.0 - 1e-10), 1.1 * spread - mean, 0.0)
+    # Where it bends down, the bend counts as one up.
+    down = np.flatnonzero(mean < spread * (1.0 - 1e-10))
+    if len(down):
+        a[down], b[down], c[down] = _absolute(a[down], b[down], c[down], mean[down], spread[down])
     a += ridge
     c += ridge
     determinant = np.maximum(a * c - b * b, ridge * (a + c))
@@ -141,6 +145,18 @@ def _newton_moves(
     p *= shrink
     q *= shrink
     return p * first + q * second, p * across_first + q * across_second, sines
+
+
+def _absolute(
+    a: Floats, b: Floats, c: Floats, mean: Floats, spread: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Return symmetric 2x2 matrices with the signs of their negative eigenvalues changed.
+
+    Their eigenvalues are mean +- spread. That of |M| are known, and it has the axes of M.
+    """
+    high, low = np.abs(mean + spread), np.abs(mean - spread)
+    middle, slope = 0.5 * (high + low), 0.5 * (high - low) / spread
+    return middle + slope * (a - mean), slope * b, middle + slope * (c - mean)
 
 
 def _line_search(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from limit_surface_ros.checks import as_floats, as_vectors
 from limit_surface_ros.errors import RangeError, ShapeError
-from limit_surface_ros.surface.power_sum_dissipation import loads_of_twists
+from limit_surface_ros.surface.power_sum_inverse import power_sum_inverse
 from limit_surface_ros.surface.power_sum_scale import log_scales
 from limit_surface_ros.surface.quadratic_form import as_psd_matrices, root_of
 from limit_surface_ros.surface.scaled_surface import ScaledSurface
@@ -19,6 +20,12 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.gauge_inverse import Inverse
+
+# Part of a twist along a load without limit, above which its power is infinite.
+_FREE = 1e-12
+# Relative eigenvalue below which nothing limits a load.
+_NO_LIMIT = 1e-15
 
 
 def thesis_exponents(terms: int) -> Floats:
@@ -161,7 +168,32 @@ class PowerSum(ScaledSurface):
         return gradient
 
     def _loads(self, twists: Floats) -> Floats:
-        return loads_of_twists(self._roots, self.exponents, twists)
+        if len(self._free):
+            unlimited = np.abs(self._free @ twists).max(axis=0) > _FREE * np.abs(twists).max(
+                axis=0
+            )
+            if unlimited.any():
+                raise RangeError(
+                    "this surface has no limit to the load of a twist: the power of "
+                    f"scaled twist {twists[:, unlimited][:, 0].tolist()} is infinite"
+                )
+        return self._inverse.solve(twists)[0]
+
+    @cached_property
+    def _free(self) -> Floats:
+        """Orthonormal loads that nothing limits, shape (q, 3)."""
+        size, vectors = np.linalg.eigh(sum(m / np.trace(m) for m in self.matrices))
+        free: Floats = vectors[:, size <= _NO_LIMIT * size[-1]].T
+        return free
+
+    @cached_property
+    def _inverse(self) -> Inverse:
+        roots = self._roots
+        if len(self._free):
+            # A limit within one term keeps the answer at zero along what nothing limits.
+            bounded = self.matrices[0] + np.trace(self.matrices[0]) * self._free.T @ self._free
+            roots = np.array([root_of(bounded), *roots[1:]])
+        return power_sum_inverse(roots, self.exponents)
 
     def _images(self, columns: Floats) -> Floats:
         """Return R_i f, shape (k, 3, ...)."""

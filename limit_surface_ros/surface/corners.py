@@ -1,0 +1,91 @@
+"""Corners of a surface, where many normals meet, and the nearest one to a given normal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from limit_surface_ros.checks import Floats
+
+# Relative width of the rim that counts as part of a cone of normals.
+_RIM = 1e-12
+_NO_POWER = 1e-100
+# Curvature below which a surface counts as flat beside a corner.
+_FLAT = 1e-3
+
+
+@dataclass(frozen=True)
+class Corners:
+    """Pairs of opposite points x_k and -x_k where one norm |R_k x| of a convex sum is zero.
+
+    There that norm has any gradient R_k' y with |y| <= 1 beside the gradient c_k of the rest, so
+    that the normals at x_k fill a cone over an ellipse. For a dissipation, x_k is the rotation
+    about a support point and the ellipse is a facet of the set of loads.
+
+    Attributes:
+        points: x_k, scaled so that c_k.x_k = 1, shape (q, 3).
+        inverses: G_k with G_k R_k' = 1, shape (q, 2, 3).
+        centres: G_k c_k, shape (q, 2).
+        bends: G_k H_k G_k' with the Hessian H_k of the rest, shape (q, 2, 2).
+    """
+
+    points: Floats
+    inverses: Floats
+    centres: Floats
+    bends: Floats
+
+    @classmethod
+    def of_norms(
+        cls, points: Floats, roots: Floats, gradients: Floats, hessians: Floats
+    ) -> Corners | None:
+        """Return the corners of a sum at the zeros of its norms, None if there are none.
+
+        Args:
+            points: Zeros of the norms, shape (q, 3).
+            roots: R_k of these norms, shape (q, 2, 3).
+            gradients: Gradients of the rest at the points, shape (3, q).
+            hessians: Hessians of the rest at the points, shape (3, 3, q).
+        """
+        if len(points) == 0:
+            return None
+        inverses = np.asarray(np.linalg.pinv(roots), dtype=np.float64).transpose(0, 2, 1)
+        return cls(
+            points / (gradients.T * points).sum(axis=1)[:, np.newaxis],
+            inverses,
+            np.einsum("qij,jq->qi", inverses, gradients),
+            inverses @ np.moveaxis(hessians, -1, 0) @ np.swapaxes(inverses, 1, 2),
+        )
+
+    def nearest(self, normals: Floats) -> tuple[Floats, Floats]:
+        """Return how far normals lie from their nearest corner's cone, and the point to expect.
+
+        Args:
+            normals: Of any size, shape (3, m).
+
+        Returns:
+            Distances (m,) from the axis of the cone in its own radii, at most 1 within it; and
+            points (3, m), not scaled: exact within the cone, of second order beyond.
+        """
+        factors = self.points @ normals
+        # A normal without power is infinitely far: a large number will do, and no warning.
+        factors[np.abs(factors) < _NO_POWER] = _NO_POWER
+        first = (self.inverses[:, 0] @ normals) / factors - self.centres[:, :1]
+        second = (self.inverses[:, 1] @ normals) / factors - self.centres[:, 1:]
+        squares = first * first + second * second
+        which = squares.argmin(axis=0)
+        columns = np.arange(normals.shape[1])
+        distance = np.sqrt(squares[which, columns])
+        # The rim belongs to the cone.
+        distance[distance <= 1.0 + _RIM] = 1.0
+        q = np.array([first[which, columns], second[which, columns]])
+        # |y| - q.y + y'My/2 in y = R_k (x - x_k) is least near y along q, this far out:
+        bend = np.einsum("im,mij,jm->m", q, self.bends[which], q) + _FLAT * distance**2
+        y = q * np.maximum((distance - 1.0) * distance / bend, 0.0)
+        move = np.einsum("mij,im->jm", self.inverses[which], y)
+        kink = self.points[which].T
+        power = factors[which, columns]
+        points = np.sign(power) * (kink + move - kink * ((normals * move).sum(axis=0) / power))
+        return distance, points

@@ -1,0 +1,182 @@
+"""Points of most power on a surface given by its gauge: the inverse of its normals.
+
+Where the surface is convex one climb from a good start is enough; a normal in the cone of a
+corner is met exactly, without climbing. Elsewhere all peaks of a table of starts are climbed.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+import numpy as np
+
+from limit_surface_ros.surface.plane_minimum import Gauge, certain_minimum, plane_minimum
+from limit_surface_ros.surface.sphere import even_directions
+
+if TYPE_CHECKING:
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.corners import Corners
+
+# Neighbours of a start among which it must be best to be a peak, and peaks that are climbed.
+_NEIGHBOURS = 8
+_PEAKS = 8
+# A lower peak is climbed if the table shows at least this part of the best one's power.
+_WORTH = 0.7
+# Steps by upper bounds before Newton's method: each at least halves the way to a ridge.
+_BOUND_STEPS = 15
+# Effort for the axes in which a surface is about round.
+_FRAME_POINTS = 300
+_FRAME_STEPS = 6
+
+
+class Inverse(Protocol):
+    """Finds, for vectors n, the points of a surface with the largest n.x."""
+
+    def solve(self, normals: Floats) -> tuple[Floats, Floats]:
+        """Return the points (3, m) for vectors (3, m), none zero, and the largest n.x (m,)."""
+        ...
+
+
+@runtime_checkable
+class BoundedGauge(Gauge, Protocol):
+    """A gauge with an ellipsoid inside its surface through each point of it."""
+
+    def ellipsoids(self, points: Floats) -> Floats:
+        """Return P (m, 3, 3): the ellipsoids x' P^-1 x = 1 touch the surface at points (3, m)."""
+        ...
+
+
+class ConvexInverse:
+    """Points x of g(x) = 1 with the largest n.x, for a convex gauge g."""
+
+    def __init__(self, gauge: Gauge, directions: Floats, corners: Corners | None = None) -> None:
+        """Prepare the table of starts.
+
+        Args:
+            gauge: The gauge g, above 0 but at 0.
+            directions: Where to start from, spread over the sphere, shape (3, d).
+            corners: Corners of the surface, if it has any.
+        """
+        self._gauge = gauge
+        self._corners = corners
+        self._starts = directions / _values(gauge, directions)
+
+    def solve(self, normals: Floats) -> tuple[Floats, Floats]:
+        """Return the points (3, m) of most power for vectors (3, m), and that power (m,).
+
+        Raises:
+            SolverError: A point could not be certified.
+        """
+        units = normals / np.sqrt((normals * normals).sum(axis=0))
+        points = self._starts[:, np.argmax(self._starts.T @ units, axis=0)]
+        smooth = np.arange(units.shape[1])
+        if self._corners is not None:
+            distance, near = self._corners.nearest(units)
+            in_cone = distance <= 1.0
+            smooth = np.flatnonzero(~in_cone)
+            points[:, smooth] = self._better(units, points, near)[:, smooth]
+            points[:, in_cone] = near[:, in_cone]
+        if len(smooth):
+            points[:, smooth] = certain_minimum(self._gauge, units[:, smooth], points[:, smooth])
+        points /= _values(self._gauge, points)
+        return points, (normals * points).sum(axis=0)
+
+    def _better(self, units: Floats, first: Floats, second: Floats) -> Floats:
+        """Return of two points for each vector the direction of more power."""
+        powers = [(units * points).sum(axis=0) for points in (first, second)]
+        second_power = powers[1] / _values(self._gauge, second)
+        better: Floats = np.where(powers[0] >= second_power, first, second)
+        return better
+
+
+class PeakInverse:
+    """Points x of g(x) = 1 with the largest n.x, for a gauge that need not be convex.
+
+    The surface holds an ellipsoid through each point of a table. How far these reach along n is
+    known at once, and the peaks among them are climbed.
+    """
+
+    def __init__(self, gauge: Gauge, directions: Floats) -> None:
+        """Prepare the table and who is whose neighbour in it.
+
+        Args:
+            gauge: The gauge g, above 0 but at 0.
+            directions: Where to start from, spread over half the sphere and along any ridges of
+                the surface, shape (3, d).
+        """
+        self._gauge = gauge
+        self._ellipsoids = self._inside(directions / _values(gauge, directions))
+        likeness = np.abs(directions.T @ directions)
+        self._neighbours = np.argsort(-likeness, axis=1)[:, 1 : _NEIGHBOURS + 1]
+
+    def solve(self, normals: Floats) -> tuple[Floats, Floats]:
+        """Return the points (3, m) of most power for vectors (3, m), and that power (m,)."""
+        units = normals / np.sqrt((normals * normals).sum(axis=0))
+        squares = (units[:, np.newaxis] * units).reshape(9, -1)
+        reach = self._ellipsoids.reshape(-1, 9) @ squares
+        peaks = reach.copy()
+        for neighbour in self._neighbours.T:
+            peaks[reach < reach[neighbour]] = -np.inf
+        order = np.argpartition(-peaks, _PEAKS, axis=0)[:_PEAKS]
+        heights = np.take_along_axis(peaks, order, axis=0)
+        worth = heights >= _WORTH**2 * heights.max(axis=0)
+        best = np.zeros_like(units)
+        best_power = np.zeros(units.shape[1])
+        for row, climbed in zip(order, worth, strict=True):
+            columns = np.flatnonzero(climbed)
+            if len(columns) == 0:
+                continue
+            points = self._climb(units[:, columns], self._ellipsoids[row[columns]])
+            power = (points * units[:, columns]).sum(axis=0)
+            better = power > best_power[columns]
+            best[:, columns[better]] = points[:, better]
+            best_power[columns[better]] = power[better]
+        return best, (normals * best).sum(axis=0)
+
+    def _inside(self, points: Floats) -> Floats:
+        """Return ellipsoids (m, 3, 3) within the surface through its points (3, m).
+
+        Where the gauge offers none they are no more than the lines to the points.
+        """
+        if isinstance(self._gauge, BoundedGauge):
+            return self._gauge.ellipsoids(points)
+        lines: Floats = np.einsum("im,jm->mij", points, points)
+        return lines
+
+    def _climb(self, units: Floats, ellipsoids: Floats) -> Floats:
+        points = np.einsum("mij,jm->im", ellipsoids, units)
+        if isinstance(self._gauge, BoundedGauge):
+            for _ in range(_BOUND_STEPS):
+                ellipsoids = self._gauge.ellipsoids(points / np.abs(points).max(axis=0))
+                points = np.einsum("mij,jm->im", ellipsoids, units)
+        points, _ = plane_minimum(self._gauge, units, points, np.zeros(units.shape[1]))
+        return points / _values(self._gauge, points)
+
+
+class FramedInverse:
+    """An inverse in other axes, in which the surface is about as wide in all directions."""
+
+    def __init__(self, frame: Floats, inverse: Inverse) -> None:
+        """Keep the frame F, points x = F y, and the inverse in y."""
+        self._frame = frame
+        self._inverse = inverse
+
+    def solve(self, normals: Floats) -> tuple[Floats, Floats]:
+        """Return the points (3, m) of most power for vectors (3, m), and that power (m,)."""
+        points, power = self._inverse.solve(self._frame.T @ normals)
+        return self._frame @ points, power
+
+
+def round_frame(gauge: Gauge) -> Floats:
+    """Return a matrix F (3, 3) so that the points y with g(F y) = 1 spread evenly about zero."""
+    directions = even_directions(_FRAME_POINTS).T
+    frame = np.eye(3)
+    for _ in range(_FRAME_STEPS):
+        points = frame @ directions
+        points /= _values(gauge, points)
+        frame = np.linalg.cholesky(3.0 * points @ points.T / _FRAME_POINTS)
+    return frame
+
+
+def _values(gauge: Gauge, points: Floats) -> Floats:
+    return gauge.derivatives(points, np.zeros(points.shape[1]))[0]
