@@ -18,6 +18,7 @@ EXTRAS = {
 
 # Each program's name and the module whose main() it runs.
 PROGRAMS: dict[str, str] = {
+    "fit_catalogue": "limit_surface_ros.tools.fit_catalogue",
     "fit_surface": "limit_surface_ros.tools.fit_surface",
 }
 

@@ -95,6 +95,12 @@ class NoOnsetError(LimitSurfaceError, ValueError):
     code = "BAD_MODEL"
 
 
+class ClusterError(LimitSurfaceError, ConnectionError):
+    """A cluster cannot be reached, is lost on the way, or is not fit for the work."""
+
+    code = "INTERNAL"
+
+
 class MissingExtraError(LimitSurfaceError, ImportError):
     """An optional library is absent; the message names the extra that brings it."""
 

@@ -8,10 +8,6 @@ number of workers.
 from __future__ import annotations
 
 import math
-import multiprocessing
-import signal
-import threading
-from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -20,9 +16,11 @@ import numpy as np
 from scipy.optimize import minimize
 
 from limit_surface_ros.errors import RangeError, SolverError
+from limit_surface_ros.fitting.worker_processes import worker_processes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from concurrent.futures import Executor
 
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.fitting.objective import Objective
@@ -149,19 +147,11 @@ def process_pool(workers: int) -> Iterator[Executor | None]:
     Raises:
         RangeError: `workers` is below 1.
     """
-    if workers < 1:
-        raise RangeError(f"workers must be at least 1, got {workers}")
     if workers == 1:
         yield None
         return
-    # Forking is instant and safe while there are no threads; otherwise workers start afresh.
-    alone = threading.active_count() == 1 and "fork" in multiprocessing.get_all_start_methods()
-    context = multiprocessing.get_context("fork" if alone else "spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_ignore_interrupt)
-    try:
+    with worker_processes(workers) as pool:
         yield pool
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 def _in_order(objective: Objective, search: Search) -> Iterator[Descent]:
@@ -177,7 +167,3 @@ def _in_order(objective: Objective, search: Search) -> Iterator[Descent]:
     finally:
         for future in futures:
             future.cancel()
-
-
-def _ignore_interrupt() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -11,27 +11,36 @@ if TYPE_CHECKING:
     import argparse
     from collections.abc import Callable, Sequence
 
+FAILED = 1
 USAGE_ERROR = 2
 INTERRUPTED = 130
 
 
 def run_program(
     parser: argparse.ArgumentParser,
-    run: Callable[[argparse.Namespace], None],
+    run: Callable[[argparse.Namespace], int | None],
     argv: Sequence[str] | None,
+    interrupted: str = "interrupted, nothing was written",
 ) -> int:
     """Parse arguments, run, and return the exit code.
 
+    Args:
+        parser: Of the command line.
+        run: What the program does; it may return an exit code of its own.
+        argv: The command line; that of the process if not given.
+        interrupted: What to say after Ctrl-C.
+
     Returns:
-        0; 2 with one line on standard error when the input is at fault; 130 when interrupted.
+        0, or what `run` returns; 2 with one line on standard error when the input is at fault;
+        130 when interrupted.
     """
     arguments = parser.parse_args(argv)
     try:
-        run(arguments)
+        code = run(arguments)
     except LimitSurfaceError as error:
         print(f"{parser.prog}: error: {error}", file=sys.stderr)
         return USAGE_ERROR
     except KeyboardInterrupt:
-        print(f"{parser.prog}: interrupted, nothing was written", file=sys.stderr)
+        print(f"{parser.prog}: {interrupted}", file=sys.stderr)
         return INTERRUPTED
-    return 0
+    return code or 0

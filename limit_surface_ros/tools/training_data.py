@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from limit_surface_ros.surface.pairs import Pairs
     from limit_surface_ros.surface.protocol import LimitSurface
 
+SUFFIXES = (".yaml", ".yml", ".csv")
 ACCEPTED = "a contact file (.yaml, .yml) or recorded pushes (.csv)"
 
 

@@ -1,0 +1,57 @@
+"""Pools of processes that an interrupt ends at once and that never outlive their parent."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from limit_surface_ros.errors import RangeError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from concurrent.futures import Executor
+
+
+@contextmanager
+def worker_processes(workers: int) -> Iterator[Executor]:
+    """Give an executor of `workers` processes.
+
+    On an error or an interrupt the processes are ended, whatever they are doing, and print
+    nothing.
+
+    Raises:
+        RangeError: `workers` is below 1.
+    """
+    if workers < 1:
+        raise RangeError(f"workers must be at least 1, got {workers}")
+    # Forking is instant and safe while there are no threads; otherwise workers start afresh.
+    alone = threading.active_count() == 1 and "fork" in multiprocessing.get_all_start_methods()
+    context = multiprocessing.get_context("fork" if alone else "spawn")
+    others = set(multiprocessing.active_children())
+    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin)
+    try:
+        yield pool
+    except BaseException:
+        for process in set(multiprocessing.active_children()) - others:
+            process.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _begin() -> None:
+    # A terminal interrupts the whole group: what becomes of the workers is the parent's to say.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

@@ -1,0 +1,149 @@
+"""fit_catalogue: every object that can be fitted is, once; a run that ends early goes on."""
+
+import json
+import os
+import signal
+import subprocess
+
+import pytest
+
+from catalogue_helpers import OPTIONS, group_is_gone, matrices, started, until, write_objects
+from limit_surface_ros.files.surface_file import read_surface_model
+from limit_surface_ros.tools import fit_catalogue, fit_surface
+
+MODULE = "limit_surface_ros.tools.fit_catalogue"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write_objects(tmp_path / "pushes", 4)
+    return tmp_path / "pushes"
+
+
+def run(folder, output, *options):
+    return fit_catalogue.main([str(folder), "--output", str(output), *OPTIONS, *options])
+
+
+def times(output):
+    return {path.name: path.stat().st_mtime_ns for path in output.iterdir()}
+
+
+def test_models_do_not_depend_on_the_number_of_workers(folder, tmp_path):
+    names = [path.stem for path in sorted(folder.iterdir())]
+    assert run(folder, tmp_path / "one", "--workers", "1") == 0
+    assert run(folder, tmp_path / "two", "--workers", "2") == 0
+    assert matrices(tmp_path / "one", names) == matrices(tmp_path / "two", names)
+    fit_surface.main([str(folder / "object_02.csv"), "-o", str(tmp_path / "m.yaml"), *OPTIONS])
+    assert matrices(tmp_path, ["m"]) == matrices(tmp_path / "two", ["object_02"])
+
+
+def test_a_bad_object_fails_alone_and_is_listed_at_the_end(folder, tmp_path, capsys):
+    (folder / "object_01.csv").write_text("fx_N,fy_N\n1,2\n")
+    (folder / "object_03.csv").write_bytes(b"\xff\xfe\x00")
+    assert run(folder, tmp_path / "models") == 1
+    printed = capsys.readouterr()
+    failed = printed.err.splitlines()
+    assert [line.split(":")[0] for line in failed] == [
+        "FAILED object_01.csv",
+        "FAILED object_03.csv",
+    ]
+    assert "column tau_Nm is missing" in failed[0]
+    assert "2 fitted, 0 kept, 2 failed" in printed.out
+    assert sorted(times(tmp_path / "models")) == ["object_00.yaml", "object_02.yaml"]
+
+
+def test_finished_models_are_kept_until_their_input_or_the_options_change(
+    folder, tmp_path, capsys
+):
+    output = tmp_path / "models"
+    run(folder, output)
+    first = times(output)
+    assert run(folder, output, "--workers", "1") == 0
+    assert "4 finished before, 0 to fit" in capsys.readouterr().out
+    assert times(output) == first
+
+    changed = folder / "object_01.csv"
+    changed.write_text("\n".join(changed.read_text().splitlines()[:-1]) + "\n")
+    cut = output / "object_02.yaml"
+    cut.write_text(cut.read_text()[:-20])
+    run(folder, output)
+    refitted = {name for name, time in times(output).items() if time != first[name]}
+    assert refitted == {"object_01.yaml", "object_02.yaml"}
+    assert read_surface_model(output / "object_01.yaml").fit["training"]["pairs"] == 39
+
+    second = times(output)
+    run(folder, output, "--objective", "J1")
+    assert all(time != second[name] for name, time in times(output).items())
+    run(folder, output, "--objective", "J1", "--refit")
+    assert "4 finished before" not in capsys.readouterr().out.splitlines()[-2]
+
+
+def test_an_interrupted_run_leaves_whole_models_and_goes_on(tmp_path, capsys):
+    names = write_objects(tmp_path / "pushes", 30)
+    output = tmp_path / "models"
+    arguments = [tmp_path / "pushes", "-o", output, *OPTIONS, "--workers", "2"]
+    process = started(MODULE, *arguments, stderr=subprocess.PIPE, stdout=subprocess.PIPE)
+    until(lambda: output.is_dir() and list(output.glob("*.yaml")), "the first model")
+    os.killpg(process.pid, signal.SIGINT)
+    errors = process.communicate(timeout=20)[1]
+    assert process.returncode == 130
+    assert errors.splitlines() == [
+        "fit_catalogue: interrupted; finished models are kept, the same command goes on from there"
+    ]
+    until(lambda: group_is_gone(process.pid), "every process of the run ends", 5)
+    done = times(output)
+    assert 0 < len(done) < 30
+    for name in done:
+        read_surface_model(output / name)
+
+    assert run(tmp_path / "pushes", output) == 0
+    assert f"{len(done)} finished before" in capsys.readouterr().out
+    assert done.items() <= times(output).items()
+    assert len(matrices(output, names)) == 30
+
+
+def test_a_killed_run_leaves_no_process_and_goes_on(tmp_path):
+    names = write_objects(tmp_path / "pushes", 30)
+    output = tmp_path / "models"
+    arguments = [tmp_path / "pushes", "-o", output, *OPTIONS, "--workers", "2"]
+    process = started(MODULE, *arguments, stdout=subprocess.DEVNULL)
+    until(lambda: output.is_dir() and list(output.glob("*.yaml")), "the first model")
+    process.kill()
+    process.wait()
+    until(lambda: group_is_gone(process.pid), "the workers end with their parent", 20)
+    done = times(output)
+    assert len(list(output.glob("*.yaml"))) < 30
+    assert run(tmp_path / "pushes", output) == 0
+    assert done.items() <= times(output).items()
+    assert len(matrices(output, names)) == 30
+
+
+@pytest.mark.parametrize(
+    ("prepare", "output", "message"),
+    [
+        (lambda folder: (folder / "object_00.yaml").touch(), "models", "would both become"),
+        (lambda folder: None, "pushes", "must go to another folder"),
+        (lambda folder: [path.unlink() for path in folder.iterdir()], "models", "holds no .yaml"),
+        (lambda folder: folder.rename(folder.parent / "gone"), "models", "no such folder"),
+        (lambda folder: (folder.parent / "models").touch(), "models", "cannot be made"),
+    ],
+)
+def test_a_catalogue_that_cannot_be_is_refused_at_once(
+    folder, tmp_path, capsys, prepare, output, message
+):
+    prepare(folder)
+    assert run(folder, tmp_path / output) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_every_option_that_changes_models_tells_them_apart():
+    top = fit_catalogue.parser()
+    base = ["in", "-o", "out"]
+    same = top.parse_args(base)
+    for options in (["--terms", "2"], ["--seed", "1"], ["--family", "norms"], ["--starts", "3"]):
+        changed = top.parse_args(base + options)
+        assert fit_catalogue.fit_settings(changed) != fit_catalogue.fit_settings(same)
+    for options in (["--workers", "7"], ["--dask", "tcp://a:1"], ["--refit"]):
+        changed = top.parse_args(base + options)
+        assert fit_catalogue.fit_settings(changed) == fit_catalogue.fit_settings(same)
+    assert "seed" in json.loads(fit_catalogue.fit_settings(same))
