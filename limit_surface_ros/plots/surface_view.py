@@ -26,7 +26,7 @@ SECTIONS = ((0, 1), (0, 2), (1, 2))
 SLAB = 0.05
 
 _SECTION_POINTS = 721
-_MERIDIANS, _PARALLELS = 97, 61
+_MERIDIANS, _PARALLELS = 73, 47
 _MOST_DOTS = 1500
 # Where the viewer stands and where the light comes from [deg].
 _AZIMUTH, _ELEVATION = -55.0, 24.0
@@ -110,6 +110,7 @@ def draw_solid(
     surface: LimitSurface | None,
     loads: Floats | None = None,
     color: str = CYCLE[0],
+    dot_color: str = BLACK,
 ) -> None:
     """Draw a surface in load space, lit from above, with the loads that data give as dots.
 
@@ -119,6 +120,7 @@ def draw_solid(
         loads: Wrenches, shape (n, 3); of very many, an even choice is drawn, and in front of a
             surface only those on the viewer's side, as behind it they would not be seen.
         color: Of the surface.
+        dot_color: Of the loads.
     """
     grid = np.zeros((1, 1, 3)) if surface is None else surface_grid(surface)
     extent = np.abs(grid).max(axis=(0, 1))
@@ -141,7 +143,7 @@ def draw_solid(
         dots = loads[:: max(1, -(-len(loads) // _MOST_DOTS))]
         if surface is not None:
             dots = dots[(dots / extent) @ _unit_vector(_AZIMUTH, _ELEVATION) > 0.0]
-        axes.scatter(*dots.T, s=3, color=BLACK, linewidths=0, depthshade=False, zorder=2)
+        axes.scatter(*dots.T, s=3, color=dot_color, linewidths=0, depthshade=False, zorder=2)
     style_solid(axes, extent)
 
 
@@ -158,7 +160,7 @@ def style_solid(axes: Axes3D, extent: Floats) -> None:
     axes.tick_params(axis="z", pad=2)
     for name in "xyz":
         axes.locator_params(axis=name, nbins=4)
-    axes.set_box_aspect((1.0, 1.0, 0.85), zoom=1.0)
+    axes.set_box_aspect((1.0, 1.0, 0.85), zoom=0.9)
     axes.view_init(elev=_ELEVATION, azim=_AZIMUTH)
 
 
