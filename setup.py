@@ -20,6 +20,8 @@ EXTRAS = {
 PROGRAMS: dict[str, str] = {
     "fit_catalogue": "limit_surface_ros.tools.fit_catalogue",
     "fit_surface": "limit_surface_ros.tools.fit_surface",
+    "fit_decay": "limit_surface_ros.tools.fit_decay",
+    "compare_decays": "limit_surface_ros.tools.compare_decays",
     "plot_surface": "limit_surface_ros.tools.plot_surface",
     "reproduce_thesis": "limit_surface_ros.tools.reproduce_thesis",
 }

@@ -17,7 +17,7 @@ from limit_surface_ros.errors import DataError
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.decay.responses import PiecewiseLinear
+    from limit_surface_ros.decay.targets import PiecewiseLinear
 
 # Delays that agree to this many decimals [s] are one.
 DELAY_DIGITS = 12

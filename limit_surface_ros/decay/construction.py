@@ -13,14 +13,14 @@ from limit_surface_ros.decay.delay_system import DelaySystem
 from limit_surface_ros.decay.impulses import find_impulses
 from limit_surface_ros.decay.kernel import memory_kernel
 from limit_surface_ros.decay.pieces import PiecewisePolynomial
-from limit_surface_ros.decay.responses import PiecewiseLinear, uniform_times
+from limit_surface_ros.decay.targets import PiecewiseLinear, uniform_times
 from limit_surface_ros.errors import DataError, RangeError
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.decay.impulses import Impulses
     from limit_surface_ros.decay.kernel import MemoryKernel
-    from limit_surface_ros.decay.responses import Response
+    from limit_surface_ros.decay.targets import Target
 
 # The closed form is for responses drawn by hand; recorded samples have more knots.
 MOST_KNOTS = 40
@@ -33,7 +33,7 @@ MOST_CELLS = 60
 
 
 def delay_system(
-    response: Response, max_delay: float, degree: int | None = None, samples: int = SAMPLES
+    response: Target, max_delay: float, degree: int | None = None, samples: int = SAMPLES
 ) -> DelaySystem:
     """Return the delay system of a response, its memory cut off at the maximum delay.
 

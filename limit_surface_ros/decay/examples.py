@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from limit_surface_ros.decay.delay_system import DelaySystem, from_quasi_polynomial
-from limit_surface_ros.decay.responses import Analytic, PiecewiseLinear, Response
+from limit_surface_ros.decay.targets import Analytic, PiecewiseLinear, Target
 from limit_surface_ros.errors import RangeError
 
 # Highest power of lambda first; row k stands before exp(-k lambda).
@@ -54,6 +54,11 @@ def kink_with_tail() -> Analytic:
     )
 
 
+def exponential() -> Analytic:
+    """Return exp(-t)."""
+    return Analytic(lambda t: np.exp(-t))
+
+
 def gaussian() -> Analytic:
     """Return exp(-t^2)."""
     return Analytic(lambda t: np.exp(-(t**2)))
@@ -64,18 +69,19 @@ def power_law() -> Analytic:
     return Analytic(lambda t: 1.0 / (1.0 + t) ** 2)
 
 
-EXAMPLES: dict[str, Callable[[], Response]] = {
+EXAMPLES: dict[str, Callable[[], Target]] = {
     "f1": hockey_stick,
     "f2": four_impulses,
     "f3": three_impulses,
     "f4": undershoot,
+    "exponential": exponential,
     "tail": kink_with_tail,
     "gaussian": gaussian,
     "power_law": power_law,
 }
 
 
-def example(name: str) -> Response:
+def example(name: str) -> Target:
     """Return the named example.
 
     Raises:

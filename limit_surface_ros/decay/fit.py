@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.decay.coefficient_fits import Criterion
-    from limit_surface_ros.decay.responses import Response
+    from limit_surface_ros.decay.targets import Target
 
 METHODS = ("dde", "neutral", "esprit", "polished", "best")
 Progress = Callable[[str], None]
@@ -59,7 +59,7 @@ class Options:
 
 
 def fit_decay(
-    response: Response,
+    response: Target,
     terms: int,
     end: float,
     method: str = "best",
@@ -102,7 +102,7 @@ def fit_decay(
 
 
 def _choose(
-    response: Response, terms: int, end: float, method: str, options: Options, tell: Progress
+    response: Target, terms: int, end: float, method: str, options: Options, tell: Progress
 ) -> RateChoice:
     if method == "dde":
         choice = dde_rates(
@@ -123,7 +123,7 @@ def _choose(
 
 
 def _best(
-    response: Response, terms: int, end: float, options: Options, tell: Progress
+    response: Target, terms: int, end: float, options: Options, tell: Progress
 ) -> RateChoice:
     """Polish each closed or sampled choice and keep the best; none of them can spoil it."""
     choices: list[RateChoice] = []
@@ -141,7 +141,7 @@ def _best(
     return min(choices, key=lambda choice: choice.error)
 
 
-def _polish(response: Response, end: float, start: RateChoice, tell: Progress) -> RateChoice:
+def _polish(response: Target, end: float, start: RateChoice, tell: Progress) -> RateChoice:
     def each_step(step: int, error: float) -> None:
         if step % 10 == 0:
             tell(f"polishing {start.method}: step {step}, error {error:.4g}")

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import fft, signal
 
 from limit_surface_ros.checks import as_floats
-from limit_surface_ros.decay.responses import require_onset
+from limit_surface_ros.decay.targets import require_onset
 from limit_surface_ros.errors import DataError, ShapeError
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def memory_kernel(
     if off.any():
         raise DataError(
             f"the breakpoint {float(places[off].flat[0] * step):g} s is not on the grid of step "
-            f"{step:g} s; responses.uniform_times gives a grid that holds it"
+            f"{step:g} s; targets.uniform_times gives a grid that holds it"
         )
     quotient = divide_series(np.diff(x) / step, x[:-1])
     return MemoryKernel(t[:-1], quotient / step, step)

@@ -14,7 +14,7 @@ from limit_surface_ros.decay.response_fits import fit_response
 if TYPE_CHECKING:
     from limit_surface_ros.decay.delay_system import DelaySystem
     from limit_surface_ros.decay.exponential_sum import Complexes
-    from limit_surface_ros.decay.responses import Response
+    from limit_surface_ros.decay.targets import Target
 
 # 0.28017 / (2 pi): Bernstein's constant of the approximation of |x|, and the density of rates.
 LAW = 0.28017 / (2.0 * np.pi)
@@ -36,16 +36,16 @@ class RateChoice:
     method: str
     error: float
     system: DelaySystem | None = None
-    parameters: Mapping[str, float | str] = field(default_factory=dict)
+    parameters: Mapping[str, float | int | str] = field(default_factory=dict)
 
 
 def judged(
     rates: Complexes,
-    response: Response,
+    response: Target,
     end: float,
     method: str,
     system: DelaySystem | None = None,
-    parameters: Mapping[str, float | str] | None = None,
+    parameters: Mapping[str, float | int | str] | None = None,
 ) -> RateChoice:
     """Return the rates with the error that they reach on [0, end]."""
     checked = as_rates(rates)

@@ -21,7 +21,7 @@ from limit_surface_ros.errors import DataError, RangeError, SolverError, Unstabl
 if TYPE_CHECKING:
     from limit_surface_ros.decay.delay_system import DelaySystem
     from limit_surface_ros.decay.exponential_sum import Complexes
-    from limit_surface_ros.decay.responses import Response
+    from limit_surface_ros.decay.targets import Target
 
 # Maximum delays tried, in settling times of the response; then around the best of them.
 FIRST_TRIALS = (1.5, 2.0, 2.5, 3.0, 3.5, 4.5, 6.0)
@@ -29,7 +29,7 @@ LATER_TRIALS = (0.9, 0.95, 1.05, 1.1)
 
 
 def dde_rates(
-    response: Response,
+    response: Target,
     terms: int,
     end: float,
     max_delay: float | None = None,
@@ -90,7 +90,7 @@ def dde_rates(
 
 
 def _best_order(
-    response: Response, terms: int, end: float, system: DelaySystem, allow_unstable: bool
+    response: Target, terms: int, end: float, system: DelaySystem, allow_unstable: bool
 ) -> RateChoice:
     """Return the better of the first roots by imaginary part and by real part."""
     if not allow_unstable:
@@ -100,7 +100,7 @@ def _best_order(
         rates = take(roots, terms)
         if len(rates) == 0:
             continue
-        parameters: dict[str, float | str] = {"max_delay": system.max_delay, "order": order}
+        parameters: dict[str, float | int | str] = {"max_delay": system.max_delay, "order": order}
         choices.append(judged(rates, response, end, "dde", system, parameters))
     if not choices:
         raise SolverError(f"{terms} term(s) cannot hold any of the roots found")

@@ -20,8 +20,8 @@ from scipy import linalg
 
 from limit_surface_ros.checks import as_floats, as_positive
 from limit_surface_ros.decay.rate_choice import RateChoice, judged, take
-from limit_surface_ros.decay.responses import uniform_times
 from limit_surface_ros.decay.smoothing import settling_time
+from limit_surface_ros.decay.targets import uniform_times
 from limit_surface_ros.errors import DataError, RangeError, ShapeError, SolverError
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.decay.exponential_sum import Complexes
-    from limit_surface_ros.decay.responses import Response
+    from limit_surface_ros.decay.targets import Target
 
 SAMPLES = 1001
 # Singular values below this fraction of the largest are rounding; rates made of them are noise.
@@ -78,7 +78,7 @@ def esprit(values: ArrayLike, step: float, terms: int) -> Complexes:
 
 
 def esprit_rates(
-    response: Response, terms: int, end: float, window: float | None = None
+    response: Target, terms: int, end: float, window: float | None = None
 ) -> RateChoice:
     """Return ESPRIT's rates of a response, from the window that gives the least error.
 
@@ -122,7 +122,7 @@ def damped(rates: Complexes, end: float) -> Complexes:
     return result
 
 
-def _times(response: Response, length: float, samples: int) -> Floats:
+def _times(response: Target, length: float, samples: int) -> Floats:
     try:
         return uniform_times(length, samples, response.breakpoints[:12], stretch=2)
     except DataError:

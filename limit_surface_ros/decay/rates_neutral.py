@@ -20,8 +20,8 @@ from limit_surface_ros.decay.rate_choice import (
     predicted_error,
 )
 from limit_surface_ros.decay.response_fits import fit_response
-from limit_surface_ros.decay.responses import largest_slope_jump
 from limit_surface_ros.decay.smoothing import settling_time, smoothed
+from limit_surface_ros.decay.targets import largest_slope_jump
 from limit_surface_ros.errors import RangeError
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.decay.exponential_sum import Complexes
-    from limit_surface_ros.decay.responses import Response
+    from limit_surface_ros.decay.targets import Target
 
 FIRST_LENGTHS = (1.05, 1.2, 1.4, 1.7)
 MOST_TRIALS = 30
@@ -57,7 +57,7 @@ def neutral_roots(terms: int, damping: float, length: float) -> Complexes:
 
 
 def neutral_rates(
-    response: Response, terms: int, end: float, tail_rates: ArrayLike | None = None
+    response: Target, terms: int, end: float, tail_rates: ArrayLike | None = None
 ) -> RateChoice:
     """Return neutral roots whose length and damping suit a response, beside known tail rates.
 

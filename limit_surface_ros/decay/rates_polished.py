@@ -28,12 +28,14 @@ from limit_surface_ros.errors import SolverError
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Bools, Floats
     from limit_surface_ros.decay.exponential_sum import Complexes
-    from limit_surface_ros.decay.responses import Response
+    from limit_surface_ros.decay.targets import Target
 
 MOST_STEPS = 100
 # Polishing ends when this many steps in a row gained less than this part of the error.
 STALL, LEAST_GAIN = 6, 1e-3
 LEAST_RADIUS = 1e-5
+# An error of this part of the response cannot be made smaller.
+ROUNDING = 1e-14
 # Rates are kept left of this many decays over the interval.
 LEAST_DECAYS = 0.4
 # Most refits of the coefficients until no point of the fine grid is worse than those seen.
@@ -48,7 +50,7 @@ class _Point:
 
 
 def polished_rates(
-    response: Response,
+    response: Target,
     end: float,
     start: RateChoice,
     progress: Callable[[int, float], None] | None = None,
@@ -75,7 +77,7 @@ def polished_rates(
             radius *= 0.25
             continue
         gain, hope = point.error - trial.error, point.error - predicted
-        if hope <= 1e-4 * point.error:
+        if hope <= 1e-4 * point.error or point.error <= ROUNDING * problem.scale:
             break
         if gain > 0.0:
             stalled = 0 if gain > LEAST_GAIN * point.error else stalled + 1
@@ -85,7 +87,7 @@ def polished_rates(
             point = trial
         if progress is not None:
             progress(steps, point.error)
-    parameters = {**start.parameters, "start": start.method, "steps": float(steps)}
+    parameters = {**start.parameters, "start": start.method, "steps": steps}
     choice = judged(point.rates, response, end, "polished", None, parameters)
     if choice.error < start.error:
         return choice
@@ -95,7 +97,7 @@ def polished_rates(
 class _Problem:
     """A response on a fine grid, of which each step sees the points that matter."""
 
-    def __init__(self, response: Response, end: float, rates: Complexes) -> None:
+    def __init__(self, response: Target, end: float, rates: Complexes) -> None:
         fastest = float(np.abs(rates.imag).max())
         self.times = fine_times(response, end, fastest)
         self.target = response(self.times)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.decay.coefficient_fits import Criterion
-    from limit_surface_ros.decay.responses import Response
+    from limit_surface_ros.decay.targets import Target
 
 LEAST_POINTS, MOST_POINTS = 4_000, 40_000
 ROUNDS = 8
@@ -49,14 +49,14 @@ class ResponseFit:
     lower_bound: float
 
 
-def fine_times(response: Response, end: float, fastest: float) -> Floats:
+def fine_times(response: Target, end: float, fastest: float) -> Floats:
     """Return times on [0, end], breakpoints included, that resolve a rate of size `fastest`."""
     count = int(np.clip(12.0 * end * fastest / np.pi, LEAST_POINTS, MOST_POINTS))
     inside = response.breakpoints[response.breakpoints < end]
     return np.unique(np.concatenate([np.linspace(0.0, end, count), inside]))
 
 
-def largest_error(x: ExponentialSum, response: Response, start: float, end: float) -> float:
+def largest_error(x: ExponentialSum, response: Target, start: float, end: float) -> float:
     """Return the largest |x - response| on [start, end] [s], on a fine grid with breakpoints."""
     times = fine_times(response, end, float(np.abs(x.rates.imag).max()))
     times = times[times >= start]
@@ -65,7 +65,7 @@ def largest_error(x: ExponentialSum, response: Response, start: float, end: floa
 
 def fit_response(
     rates: ArrayLike,
-    response: Response,
+    response: Target,
     end: float,
     norm: str | Criterion = "inf",
 ) -> ResponseFit:
@@ -100,7 +100,7 @@ def fit_response(
 
 
 def exchange(
-    basis: Floats, target: Floats, response: Response, times: Floats
+    basis: Floats, target: Floats, response: Target, times: Floats
 ) -> tuple[Floats, float, float]:
     """Minimise the largest error on all times by solving on few of them, adding the worst."""
     count, terms = basis.shape

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.decay.responses import PiecewiseLinear
+from limit_surface_ros.decay.targets import PiecewiseLinear
 
 if TYPE_CHECKING:
-    from limit_surface_ros.decay.responses import Response
+    from limit_surface_ros.decay.targets import Target
 
 # Fewer samples cannot tell noise from shape.
 LEAST_SAMPLES = 60
@@ -22,7 +22,7 @@ TOLERATED = 5e-4
 CELLS_TO_SETTLE, MOST_CELLS = 4, 36
 
 
-def noise_level(response: Response) -> float:
+def noise_level(response: Target) -> float:
     """Return the standard deviation of a record's noise, in the unit of x; 0 if it has none.
 
     Taken from the median of second differences, in which a smooth or piecewise linear response
@@ -35,7 +35,7 @@ def noise_level(response: Response) -> float:
     return float(1.4826 * np.median(np.abs(bends)) / np.sqrt(6.0))
 
 
-def settling_time(response: Response, end: float) -> float:
+def settling_time(response: Target, end: float) -> float:
     """Return the time [s] from which on |x| stays below 1 % of its largest value, or its noise."""
     times = np.linspace(0.0, end, 4001)
     sizes = np.abs(response(times))
@@ -44,7 +44,7 @@ def settling_time(response: Response, end: float) -> float:
     return float(times[min(above[-1] + 1, len(times) - 1)]) if len(above) else end
 
 
-def smoothed(response: Response, end: float) -> Response:
+def smoothed(response: Target, end: float) -> Target:
     """Return a noisy record on [0, end] as a linear spline of few cells; others as they are."""
     noise = noise_level(response)
     if noise <= TOLERATED * abs(float(response(0.0))):

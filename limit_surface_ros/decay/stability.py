@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.checks import as_positive
-from limit_surface_ros.decay.responses import PiecewiseLinear
 from limit_surface_ros.decay.roots import count_roots
+from limit_surface_ros.decay.targets import PiecewiseLinear
 from limit_surface_ros.decay.winding import turn
 from limit_surface_ros.errors import DataError, SolverError, UnstableError
 
 if TYPE_CHECKING:
     from limit_surface_ros.decay.delay_system import DelaySystem
     from limit_surface_ros.decay.exponential_sum import Complexes
-    from limit_surface_ros.decay.responses import Response
+    from limit_surface_ros.decay.targets import Target
 
 # Knots on which the transform of a response is computed.
 TRANSFORM_KNOTS = 2001
@@ -54,7 +54,7 @@ def require_stable(system: DelaySystem) -> None:
         )
 
 
-def count_growing_modes(response: Response, end: float) -> int:
+def count_growing_modes(response: Target, end: float) -> int:
     """Return the number of zeros of a response's Laplace transform in the right half plane.
 
     Each is a pole of the memory kernel's transform x(0) / X: the kernel then grows, and so do
@@ -106,7 +106,7 @@ def count_growing_modes(response: Response, end: float) -> int:
     return round(-(phase + rest + 0.5 * np.pi) / np.pi)
 
 
-def require_minimum_phase(response: Response, end: float) -> None:
+def require_minimum_phase(response: Target, end: float) -> None:
     """Refuse a response whose delay system would be unstable.
 
     Raises:
@@ -116,7 +116,7 @@ def require_minimum_phase(response: Response, end: float) -> None:
     count = count_growing_modes(response, end)
     if count:
         raise UnstableError(
-            f"the response is not minimum-phase: its Laplace transform has {count} zeros in the "
-            f"right half plane, so its memory kernel grows and its delay system is unstable. "
+            f"the response is not minimum-phase: its Laplace transform has {count} zero(s) in "
+            f"the right half plane, so its memory kernel grows and its delay system is unstable. "
             f"Use a method that needs no kernel (esprit, neutral), or allow unstable systems"
         )

@@ -10,7 +10,7 @@ from limit_surface_ros.decay.closed_kernel import ClosedKernel
 from limit_surface_ros.decay.construction import delay_system, system_of_kernel
 from limit_surface_ros.decay.impulses import find_impulses
 from limit_surface_ros.decay.kernel import divide_series, memory_kernel
-from limit_surface_ros.decay.responses import Analytic, PiecewiseLinear, uniform_times
+from limit_surface_ros.decay.targets import Analytic, PiecewiseLinear, uniform_times
 from limit_surface_ros.errors import DataError, NotFiniteError, RangeError, ShapeError
 
 

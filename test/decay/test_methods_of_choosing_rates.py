@@ -12,8 +12,8 @@ from limit_surface_ros.decay.rate_choice import predicted_error, take
 from limit_surface_ros.decay.rates_esprit import esprit
 from limit_surface_ros.decay.rates_neutral import neutral_rates, neutral_roots
 from limit_surface_ros.decay.response_fits import fit_response, largest_error
-from limit_surface_ros.decay.responses import PiecewiseLinear
 from limit_surface_ros.decay.roots import first_roots
+from limit_surface_ros.decay.targets import PiecewiseLinear
 from limit_surface_ros.errors import RangeError, ShapeError, UnstableError
 
 END = 19.0

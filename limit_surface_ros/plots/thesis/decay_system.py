@@ -14,8 +14,8 @@ from limit_surface_ros.decay.examples import example, thesis_system
 from limit_surface_ros.decay.impulses import find_impulses
 from limit_surface_ros.decay.kernel import memory_kernel
 from limit_surface_ros.decay.pieces import PiecewisePolynomial
-from limit_surface_ros.decay.responses import PiecewiseLinear, uniform_times
 from limit_surface_ros.decay.roots import first_roots
+from limit_surface_ros.decay.targets import PiecewiseLinear, uniform_times
 from limit_surface_ros.plots.canvas import BLACK, BLUE, SKY, VERMILION, new_figure
 from limit_surface_ros.plots.thesis.findings import Claim, Findings, Study
 

@@ -124,7 +124,7 @@ class Analytic:
         return jumps
 
 
-Response: TypeAlias = PiecewiseLinear | Analytic
+Target: TypeAlias = PiecewiseLinear | Analytic
 
 
 def require_onset(value: float) -> None:
@@ -166,6 +166,6 @@ def uniform_times(
     )
 
 
-def largest_slope_jump(response: Response) -> float:
+def largest_slope_jump(response: Target) -> float:
     """Return the largest |jump| of the slope after the onset; 0 for a smooth response."""
     return float(np.abs(response.slope_jumps).max(initial=0.0))

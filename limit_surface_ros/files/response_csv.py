@@ -1,0 +1,95 @@
+"""Recorded responses in CSV: one row per sample, its time and the value that dies away.
+
+A first line may name the columns; without names the first column is the time and the second the
+value. Blank lines and lines that begin with `#` are skipped. Times are counted from the first.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from limit_surface_ros.decay.targets import PiecewiseLinear
+from limit_surface_ros.errors import DataError, FileError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+def read_response(
+    path: str | Path, time_column: str | None = None, value_column: str | None = None
+) -> PiecewiseLinear:
+    """Read a recorded response.
+
+    Args:
+        path: The file.
+        time_column: Name of the column of times [s]; the first column if not given.
+        value_column: Name of the column of values; the second column if not given.
+
+    Raises:
+        FileError: The file cannot be read, a column is missing, or a cell is no finite number; the
+            message names file and line.
+        DataError: The samples are no response: times that do not increase, x(0) = 0.
+    """
+    path = Path(path)
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError as error:
+        raise FileError(f"{path}: is not UTF-8 text: {error}") from None
+    rows = [
+        (number, [cell.strip() for cell in next(csv.reader([line]))])
+        for number, line in enumerate(lines, start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not rows:
+        raise FileError(f"{path}: holds no rows; rows of time and value are accepted")
+    names = rows[0][1] if not all(_is_number(cell) for cell in rows[0][1]) else None
+    columns = (
+        _column(path, names, time_column, 0),
+        _column(path, names, value_column, 1),
+    )
+    samples = np.array(
+        [_numbers(path, number, cells, columns) for number, cells in rows[names is not None :]]
+    )
+    if len(samples) < 2:
+        raise FileError(f"{path}: holds {len(samples)} samples; at least 2 are needed")
+    try:
+        return PiecewiseLinear(samples[:, 0] - samples[0, 0], samples[:, 1])
+    except DataError as error:
+        raise DataError(f"{path}: {error}") from None
+
+
+def _column(path: Path, names: Sequence[str] | None, wanted: str | None, default: int) -> int:
+    if wanted is None:
+        return default
+    if names is None:
+        raise FileError(f"{path}: names no columns in its first line, so none is {wanted!r}")
+    if names.count(wanted) != 1:
+        found = "missing" if wanted not in names else "given twice"
+        raise FileError(f"{path}: column {wanted!r} is {found}; there are {', '.join(names)}")
+    return names.index(wanted)
+
+
+def _numbers(path: Path, line: int, cells: Sequence[str], columns: Sequence[int]) -> list[float]:
+    numbers = []
+    for column in columns:
+        if column >= len(cells):
+            raise FileError(f"{path}: line {line}: has no column {column + 1}")
+        if not _is_number(cells[column]) or not math.isfinite(float(cells[column])):
+            raise FileError(f"{path}: line {line}: {cells[column]!r} is not a finite number")
+        numbers.append(float(cells[column]))
+    return numbers
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True

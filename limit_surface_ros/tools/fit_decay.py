@@ -1,0 +1,207 @@
+"""Approximate a decaying response by a sum of exponentials, and write it as a decay model.
+
+The rates come from the response's own delay differential equation (method dde), from closed
+formulas, from the samples, or from a search; the coefficients are optimal on them in the norm
+asked for.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from limit_surface_ros import __version__
+from limit_surface_ros.decay.coefficient_fits import NORMS
+from limit_surface_ros.decay.fit import METHODS, Options, fit_decay
+from limit_surface_ros.decay.response_fits import largest_error
+from limit_surface_ros.errors import RangeError
+from limit_surface_ros.files.decay_file import DecayModel, write_decay_model
+from limit_surface_ros.tools.decay_input import add_input_options, read_input
+from limit_surface_ros.tools.program import run_program
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from limit_surface_ros.decay.fit import DecayFit
+    from limit_surface_ros.tools.decay_input import DecayInput
+
+EXAMPLES = """methods:
+  dde       characteristic roots of the response's own delay system (the thesis); its maximum
+            delay is found by trial fits unless --max-delay gives it
+  neutral   roots of x(t) = eps x(t - L), in closed form, beside --tail-rate if given
+  esprit    rates of the samples by ESPRIT, coefficients refitted
+  polished  those of esprit, moved to make the largest error smaller
+  best      the best of neutral and esprit, polished
+
+examples:
+  fit_decay f1 --terms 9 --output hockey_stick.yaml
+  fit_decay f1 --terms 15 --method dde --max-delay 6 --output thesis.yaml
+  fit_decay relaxation.csv --value-column force --terms 7 --norm 2 --output relaxation.yaml
+"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
+    top = argparse.ArgumentParser(
+        prog="fit_decay",
+        description=__doc__,
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add_input_options(top)
+    top.add_argument(
+        "-n",
+        "--terms",
+        type=int,
+        required=True,
+        help="number of real terms; a conjugate pair counts two",
+    )
+    top.add_argument("-o", "--output", type=Path, help="model file to write (.yaml)")
+    top.add_argument("--name", help="the model's name; default: that of the output file")
+    top.add_argument("--method", choices=METHODS, default="best", help="default: %(default)s")
+    top.add_argument(
+        "--norm", choices=NORMS, default="inf", help="of the coefficients' fit; %(default)s"
+    )
+    add_method_options(top)
+    return top
+
+
+def add_method_options(top: argparse.ArgumentParser) -> None:
+    """Declare the options of single methods."""
+    top.add_argument("--max-delay", type=float, metavar="S", help="of the delay system [s] (dde)")
+    top.add_argument("--degree", type=int, help="of the kernel's polynomial pieces (dde)")
+    top.add_argument(
+        "--allow-unstable",
+        action="store_true",
+        help="go on with a response that is not minimum-phase (dde)",
+    )
+    top.add_argument(
+        "--tail-rate",
+        type=complex,
+        action="append",
+        metavar="RATE",
+        help="a known rate of the tail [1/s], as --tail-rate=-0.4+2j; may be repeated (neutral)",
+    )
+
+
+def method_options(options: argparse.Namespace) -> Options:
+    """Return the options of single methods as the library takes them."""
+    return Options(options.max_delay, options.degree, options.allow_unstable, options.tail_rate)
+
+
+def show_progress(line: str) -> None:
+    """Write a line of progress to standard error, on a terminal over the line before."""
+    if sys.stderr.isatty():
+        print(f"\r\033[K{line}", end="", file=sys.stderr, flush=True)
+    else:
+        print(line, file=sys.stderr, flush=True)
+
+
+def end_progress() -> None:
+    """Clear the line of progress."""
+    if sys.stderr.isatty():
+        print("\r\033[K", end="", file=sys.stderr, flush=True)
+
+
+def beyond(result: DecayFit, given: DecayInput) -> float | None:
+    """Return the largest error beyond the fitted interval; None where nothing is known there."""
+    if given.horizon <= given.end:
+        return None
+    return largest_error(result.fit.sum, given.target, given.end, given.horizon)
+
+
+def report(result: DecayFit, given: DecayInput) -> None:
+    """Print the summary of a fit."""
+    fit, choice = result.fit, result.choice
+    chosen = ", ".join(
+        f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}"
+        for key, value in choice.parameters.items()
+    )
+    after = beyond(result, given)
+    slowest = fit.sum.rates[int(np.argmax(fit.sum.rates.real))]
+    rows = [
+        ("response", given.source),
+        ("method", choice.method + (f" ({chosen})" if chosen else "")),
+        ("terms", f"{fit.sum.terms} real ({len(fit.sum.rates)} rates)"),
+        ("error", f"{fit.max_error:.4e} on [0, {given.end:g}] s"),
+    ]
+    if np.isfinite(fit.lower_bound):
+        gap = (fit.grid_error - fit.lower_bound) / max(fit.grid_error, 1e-300)
+        rows.append(
+            ("optimal", f"{fit.norm}-norm {fit.grid_error:.4e}, within {max(gap, 0.0):.1e}")
+        )
+    if after is not None:
+        rows.append(("beyond", f"{after:.4e} on [{given.end:g}, {given.horizon:g}] s"))
+    rows.append(("right-most", f"{slowest.real:.4g} {slowest.imag:+.4g}i 1/s"))
+    rows.append(("time", f"{result.seconds:.2f} s"))
+    for label, value in rows:
+        print(f"{label:<11} {value}")
+
+
+def history(result: DecayFit, given: DecayInput) -> dict[str, Any]:
+    """Return how the model came about, for its file."""
+    fit, choice = result.fit, result.choice
+    values: dict[str, Any] = {
+        "source": given.source,
+        "method": choice.method,
+        **choice.parameters,
+        "terms": fit.sum.terms,
+        "norm_value": fit.grid_error,
+        "lower_bound": fit.lower_bound,
+        "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
+        "version": __version__,
+    }
+    after = beyond(result, given)
+    if after is not None:
+        values["error_beyond"] = after
+        values["beyond_until"] = given.horizon
+    return values
+
+
+def run(options: argparse.Namespace) -> None:
+    """Read, fit, write, report."""
+    if options.output is not None and not options.output.parent.is_dir():
+        raise RangeError(f"{options.output}: its folder does not exist")
+    given = read_input(options)
+    result = fit_decay(
+        given.target,
+        options.terms,
+        given.end,
+        options.method,
+        options.norm,
+        method_options(options),
+        show_progress,
+    )
+    end_progress()
+    report(result, given)
+    if options.output is None:
+        return
+    model = DecayModel(
+        name=options.name or options.output.stem,
+        sum=result.fit.sum,
+        time_span=(0.0, given.end),
+        norm=result.fit.norm,
+        max_error=result.fit.max_error,
+        system=result.choice.system,
+        fit=history(result, given),
+    )
+    command = shlex.join(["fit_decay", *options.command])
+    write_decay_model(model, options.output, header=f"Made by: {command}")
+    print(f"{'written':<11} {options.output}")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the program and return its exit code."""
+    top = parser()
+    top.set_defaults(command=sys.argv[1:] if argv is None else list(argv))
+    return run_program(top, run, argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,126 @@
+"""fit_decay and compare_decays: from an example or a record to a model file and a table."""
+
+import re
+
+import numpy as np
+import pytest
+
+from limit_surface_ros.decay import examples
+from limit_surface_ros.files.decay_file import read_decay_model
+from limit_surface_ros.tools import compare_decays, fit_decay
+
+
+def write_record(path, noise=0.0, header="time,force"):
+    times = np.linspace(2.0, 8.0, 241)
+    values = 5.0 * np.exp(-0.8 * (times - 2.0)) + noise * np.random.default_rng(0).normal(size=241)
+    lines = [header] * bool(header) + [f"{t},{x}" for t, x in zip(times, values, strict=True)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_an_example_becomes_a_model_whose_error_is_true(tmp_path, capsys):
+    output = tmp_path / "f1.yaml"
+    assert fit_decay.main(["f1", "--terms", "9", "--method", "esprit", "-o", str(output)]) == 0
+    model = read_decay_model(output)
+    times = np.linspace(0.0, 6.0, 60001)
+    error = np.abs(model.sum(times) - examples.hockey_stick()(times)).max()
+    assert error == pytest.approx(model.max_error, rel=0.01)
+    assert model.name == "f1"
+    assert model.fit["method"] == "esprit"
+    assert output.read_text().startswith("# Made by: fit_decay f1 --terms 9")
+    printed = capsys.readouterr()
+    for label in ("terms", "error", "optimal", "beyond", "right-most", "time"):
+        assert re.search(rf"^{label} ", printed.out, re.MULTILINE)
+    assert "esprit" in printed.err
+
+
+def test_the_delay_system_is_written_with_its_model(tmp_path):
+    output = tmp_path / "dde.yaml"
+    arguments = ["f1", "--terms", "9", "--method", "dde", "--max-delay", "6", "-o", str(output)]
+    assert fit_decay.main(arguments) == 0
+    model = read_decay_model(output)
+    assert model.system is not None
+    value, slope = model.system.characteristic_and_derivative(model.sum.rates)
+    assert np.abs(value / slope).max() < 1e-10
+
+
+@pytest.mark.parametrize("header", ["time,force", ""])
+def test_a_record_gives_back_its_rate_from_its_own_onset(tmp_path, header):
+    record = write_record(tmp_path / "record.csv", header=header)
+    output = tmp_path / "model.yaml"
+    assert fit_decay.main([str(record), "--terms", "1", "-o", str(output)]) == 0
+    model = read_decay_model(output)
+    np.testing.assert_allclose(model.sum.rates, [-0.8], rtol=1e-3)
+    assert float(model.sum(0.0)) == pytest.approx(5.0, rel=1e-3)
+    assert model.time_span == (0.0, 6.0)
+
+
+def test_a_column_is_chosen_by_its_name(tmp_path):
+    record = tmp_path / "record.csv"
+    times = np.linspace(0.0, 4.0, 101)
+    rows = [f"{7.0},{np.exp(-2.0 * t)},{t}" for t in times]
+    record.write_text("\n".join(["other,force,stamp", *rows]))
+    output = tmp_path / "model.yaml"
+    chosen = ["--time-column", "stamp", "--value-column", "force"]
+    assert fit_decay.main([str(record), "-n", "1", *chosen, "-o", str(output)]) == 0
+    np.testing.assert_allclose(read_decay_model(output).sum.rates, [-2.0], rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "extra", "message"),
+    [
+        ("t,x\n0,1\n1,oops\n", [], "line 3: 'oops' is not a finite number"),
+        ("t,x\n0,1\n1,nan\n", [], "line 3: 'nan' is not a finite number"),
+        ("t,x\n0,1\n", [], "holds 1 samples"),
+        ("", [], "holds no rows"),
+        ("t,x\n0,0\n1,1\n", [], "x(0) must not be zero"),
+        ("t,x\n0,1\n0,0.5\n", [], "times must increase"),
+        ("t,x\n0,1\n1,0.5\n", ["--value-column", "y"], "column 'y' is missing; there are t, x"),
+        ("t,x\n0,1\n1,0.5\n", ["--end", "5"], "ends at 1 s"),
+        ("t,x\n0,1\n1,0.5\n", ["--end", "-5"], "--end"),
+        ("t\n0\n1\n", [], "has no column 2"),
+    ],
+)
+def test_a_bad_record_gives_one_line_and_no_file(tmp_path, capsys, text, extra, message):
+    record, output = tmp_path / "record.csv", tmp_path / "model.yaml"
+    record.write_text(text)
+    assert fit_decay.main([str(record), "-n", "1", "-o", str(output), *extra]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert not output.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["nowhere.csv", "-n", "3"], "no such file, and no example has that name"),
+        (["f1", "-n", "0"], "terms must be at least 1"),
+        (["f4", "-n", "5", "--method", "dde"], "not minimum-phase"),
+        (["f1", "-n", "5", "-o", "no/such/folder/f.yaml"], "folder does not exist"),
+        (["f1", "-n", "5", "--method", "dde", "--max-delay", "-1"], "max_delay"),
+    ],
+)
+def test_a_bad_request_says_what_was_wrong(capsys, arguments, message):
+    assert fit_decay.main(arguments) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_methods_and_terms_are_compared_in_one_table(capsys):
+    arguments = ["f4", "--methods", "dde", "neutral", "esprit", "--terms", "5", "7"]
+    assert compare_decays.main(arguments) == 0
+    printed = capsys.readouterr().out
+    rows = [line.split(" | ") for line in printed.splitlines() if line.startswith("| ")]
+    assert len(rows) == 2 + 6
+    assert [row[2] for row in rows if "dde" in row[0]] == ["refused", "refused"]
+    assert "dde: the response is not minimum-phase" in printed
+    errors = {(row[0], row[1]): float(row[2]) for row in rows[2:] if row[2] != "refused"}
+    assert errors["| esprit", "7"] < errors["| esprit", "5"]
+
+
+@pytest.mark.parametrize("program", [fit_decay, compare_decays])
+def test_help_teaches_with_examples(program, capsys):
+    with pytest.raises(SystemExit) as exit_code:
+        program.main(["--help"])
+    assert exit_code.value.code == 0
+    assert "examples:" in capsys.readouterr().out
