@@ -77,6 +77,18 @@ class FrameError(LimitSurfaceError, ValueError):
     code = "UNKNOWN_FRAME"
 
 
+class TransformTooOldError(FrameError):
+    """A message's stamp is older than all transforms that are remembered."""
+
+    code = "TRANSFORM_TOO_OLD"
+
+
+class TransformTooNewError(FrameError):
+    """A message's stamp is newer than the transforms that have arrived."""
+
+    code = "TRANSFORM_TOO_NEW"
+
+
 class SolverError(LimitSurfaceError, ArithmeticError):
     """A numerical method could not certify its answer."""
 

@@ -1,0 +1,102 @@
+"""Messages to arrays and back; numbers are checked here, at the boundary."""
+
+from __future__ import annotations
+
+import math
+from array import array
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from limit_surface_ros.errors import NotFiniteError, RangeError, ShapeError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from geometry_msgs.msg import Twist, Wrench
+
+    from limit_surface_ros.checks import Floats
+
+# Components beyond these are no loads or motions of this world, and products of them overflow.
+LARGEST = 1.0e100
+SMALLEST = 1.0e-100
+_WRENCH = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
+_TWIST = ("linear.x", "linear.y", "linear.z", "angular.x", "angular.y", "angular.z")
+
+
+def wrench_components(wrench: Wrench) -> tuple[float, ...]:
+    """Return (fx, fy, fz, tau_x, tau_y, tau_z) of a message.
+
+    Raises:
+        NotFiniteError: A component is NaN or infinite.
+        RangeError: A component is larger than `LARGEST`.
+    """
+    force, torque = wrench.force, wrench.torque
+    return _checked((force.x, force.y, force.z, torque.x, torque.y, torque.z), _WRENCH)
+
+
+def twist_components(twist: Twist) -> tuple[float, ...]:
+    """Return (vx, vy, vz, omega_x, omega_y, omega_z) of a message.
+
+    Raises:
+        NotFiniteError: A component is NaN or infinite.
+        RangeError: A component is larger than `LARGEST`.
+    """
+    linear, angular = twist.linear, twist.angular
+    return _checked((linear.x, linear.y, linear.z, angular.x, angular.y, angular.z), _TWIST)
+
+
+def _checked(values: tuple[float, ...], names: tuple[str, ...]) -> tuple[float, ...]:
+    # One comparison for the usual case; NaN fails it.
+    if sum(map(abs, values)) <= LARGEST:
+        return values
+    for name, value in zip(names, values, strict=True):
+        if not math.isfinite(value):
+            raise NotFiniteError(f"{name} must be finite, got {value}")
+        if abs(value) > LARGEST:
+            raise RangeError(f"{name} must be at most {LARGEST:g} in size, got {value:g}")
+    return values
+
+
+def fill_wrench(message: Wrench, wrench: Sequence[float]) -> None:
+    """Write (fx, fy, tau_z) [N, N, N m] into a message."""
+    message.force.x, message.force.y, message.torque.z = map(float, wrench)
+
+
+def fill_twist(message: Twist, twist: Sequence[float]) -> None:
+    """Write (vx, vy, omega_z) [m/s, m/s, rad/s] into a message."""
+    message.linear.x, message.linear.y, message.angular.z = map(float, twist)
+
+
+def rows_of(name: str, numbers: array[float]) -> Floats:
+    """Return a flat, row-major float64[] field as rows of three, without copying it.
+
+    Raises:
+        ShapeError: The length is no multiple of three.
+        NotFiniteError: A number is NaN or infinite; the error names the first such row.
+        RangeError: A number is larger than `LARGEST`; the error names the first such row.
+    """
+    flat = np.frombuffer(numbers, dtype=np.float64) if len(numbers) else np.empty(0)
+    if flat.size % 3:
+        raise ShapeError(
+            f"{name} must hold 3 numbers a row, row after row; {flat.size} is no multiple of 3"
+        )
+    rows = flat.reshape(-1, 3)
+    fits = np.abs(rows) <= LARGEST
+    if not fits.all():
+        row, column = (int(i) for i in np.argwhere(~fits)[0])
+        value = rows[row, column]
+        if np.isfinite(value):
+            raise RangeError(f"{name} row {row} must be at most {LARGEST:g}, got {value:g}")
+        raise NotFiniteError(f"{name} row {row} must be finite, got {rows[row].tolist()}")
+    return rows
+
+
+def flat_of(values: Floats) -> array[float]:
+    """Return any array as a float64[] field, row after row.
+
+    `array.array` is the one type that rclpy takes without looking at each element.
+    """
+    flat = array("d")
+    flat.frombytes(np.ascontiguousarray(values, dtype=np.float64).view(np.uint8).data)
+    return flat

@@ -1,0 +1,111 @@
+"""The models that a node serves: read all or none, swapped in one step, reloaded on request."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic
+
+from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
+
+from limit_surface_ros.errors import FileError, LimitSurfaceError
+from limit_surface_ros.files.model_set import Model, ModelSet, read_model_set
+from limit_surface_ros.nodes.settings import Setting
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    from limit_surface_ros.nodes.parameters import Parameters
+
+_IN_PACKAGE = "package://"
+
+
+def model_settings(folder: str, noun: str) -> tuple[Setting, ...]:
+    """Return the settings that say which models are served.
+
+    Args:
+        folder: Folder of the models that ship with this package.
+        noun: What the files hold, for the descriptions.
+    """
+    return (
+        Setting(
+            "model_files",
+            [f"{_IN_PACKAGE}limit_surface_ros/{folder}"],
+            f"YAML files of {noun}, or folders whose *.yaml are taken, as paths or "
+            "package://NAME/PATH",
+        ),
+        Setting(
+            "default_model",
+            "",
+            "Name of the model that an empty name in a request and the topics stand for; "
+            "empty: the first",
+        ),
+    )
+
+
+class ModelHost(Generic[Model]):
+    """The present set of models.
+
+    Args:
+        parameters: The node's parameters, which include `model_settings`.
+        read: Reader of one file.
+
+    Raises:
+        FileError: A file is absent or not valid, or two models share a name.
+        UnknownModelError: The default is not among the models.
+    """
+
+    models: ModelSet[Model]
+
+    def __init__(self, parameters: Parameters, read: Callable[[Path], Model]) -> None:
+        """Read the models that the parameters name."""
+        self._parameters = parameters
+        self._read = read
+        parameters.concern(["model_files", "default_model"], self._prepare)
+
+    def __getitem__(self, name: str) -> Model:
+        """Return a model; an empty name is the default model's."""
+        return self.models[name]
+
+    def reload(self) -> str:
+        """Read the files anew and swap the models in; return what is loaded, for people.
+
+        Raises:
+            LimitSurfaceError: A file is not valid; the old models keep serving.
+        """
+        self._prepare({name: self._parameters[name] for name in ("model_files", "default_model")})()
+        return self.summary
+
+    @property
+    def summary(self) -> str:
+        """What is loaded, for people."""
+        names = ", ".join(model.name for model in self.models)
+        return f"{len(self.models)} loaded: {names}; default {self.models.default}"
+
+    def _prepare(self, values: Mapping[str, Any]) -> Callable[[], None]:
+        paths = resolved(values["model_files"])
+        models = read_model_set(paths, self._read, values["default_model"])
+
+        def apply() -> None:
+            self.models = models
+
+        return apply
+
+
+def resolved(entries: Iterable[str]) -> list[str]:
+    """Return the entries with package://NAME/PATH replaced by paths.
+
+    Raises:
+        FileError: A package is not installed.
+    """
+    return [_resolved(entry) for entry in entries]
+
+
+def _resolved(entry: str) -> str:
+    if not entry.startswith(_IN_PACKAGE):
+        return entry
+    package, _, inside = entry.removeprefix(_IN_PACKAGE).partition("/")
+    try:
+        share = get_package_share_directory(package)
+    except (PackageNotFoundError, LookupError, ValueError):
+        raise FileError(f"{entry}: package {package!r} is not installed here") from None
+    return str(Path(share) / inside)

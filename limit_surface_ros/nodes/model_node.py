@@ -1,0 +1,203 @@
+"""What the nodes of this package share: models, guarded services and topics, diagnostics.
+
+A node built on `ModelNode` adds services and inputs with handlers that convert, call the core and
+convert back. Handlers raise the package's errors freely: here they become error codes, counts, and
+lines in the log that do not flood it; none leaves a callback.
+"""
+
+from __future__ import annotations
+
+import functools
+import time
+import traceback
+from typing import TYPE_CHECKING, Any, Generic
+
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from std_srvs.srv import Trigger
+
+from limit_surface_ros.errors import LimitSurfaceError
+from limit_surface_ros.files.model_set import Model
+from limit_surface_ros.nodes import answers, spin
+from limit_surface_ros.nodes.diagnostics import Diagnostics
+from limit_surface_ros.nodes.health import Health, InputAge
+from limit_surface_ros.nodes.model_host import ModelHost
+from limit_surface_ros.nodes.parameters import Parameters
+from limit_surface_ros.nodes.settings import Setting
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from pathlib import Path
+
+    from rclpy.publisher import Publisher
+
+LOG_PERIOD = 5.0
+DEPTH = 10
+COMMON_SETTINGS = (
+    Setting(
+        "input_timeout",
+        0.5,
+        "Longest silence of a topic input in node time before it is reported as stale [s]; "
+        "0: never",
+        minimum=0.0,
+        maximum=1e6,
+    ),
+    spin.EXECUTOR,
+)
+
+
+class ModelNode(Node, Generic[Model]):
+    """A node that serves models.
+
+    Attributes:
+        values: Its parameters.
+        models: Its models.
+        health: What it has seen.
+
+    Args:
+        name: Name of the node.
+        settings: Its parameter table, beside `COMMON_SETTINGS`.
+        read: Reader of one model file.
+        options: Passed on to `rclpy.node.Node`.
+
+    Raises:
+        LimitSurfaceError: A parameter or a model file is not accepted.
+        ParameterException: A parameter has the wrong type or lies outside its range.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        settings: Iterable[Setting],
+        read: Callable[[Path], Model],
+        **options: Any,
+    ) -> None:
+        """Declare parameters, read models, start diagnostics."""
+        super().__init__(name, **options)
+        try:
+            self.values = Parameters(self, [*settings, *COMMON_SETTINGS])
+            self.models = ModelHost(self.values, read)
+        except Exception:
+            self.destroy_node()
+            raise
+        self.health = Health()
+        self.create_service(Trigger, "~/reload", self._reload)
+        self._diagnostics = Diagnostics(
+            self, self.health, self.describe, lambda: self.values["input_timeout"]
+        )
+        self.get_logger().info(self.models.summary)
+
+    def describe(self) -> dict[str, str]:
+        """Return what diagnostics say beside counts and times."""
+        return {"model": self.models.models.default, "models": str(len(self.models.models))}
+
+    def add_service(
+        self, service_type: Any, name: str, handler: Callable[[Any, Any], None]
+    ) -> None:
+        """Serve `~/name`; the response ends in `error_code` and `error_msg`.
+
+        Args:
+            service_type: Type of the service.
+            name: Its name, without `~/`.
+            handler: Fills the response for a request, or raises.
+        """
+        self.create_service(
+            service_type, f"~/{name}", functools.partial(self._answer, name, handler)
+        )
+
+    def add_input(self, message_type: Any, name: str, handler: Callable[[Any], None]) -> None:
+        """Subscribe to `~/name`, best effort, so that any publisher matches.
+
+        Args:
+            message_type: Type of the messages.
+            name: Name of the topic, without `~/`.
+            handler: Takes a message, or raises to drop it.
+        """
+        self.health.inputs[name] = InputAge()
+        self.create_subscription(
+            message_type,
+            f"~/{name}",
+            functools.partial(self._take, name, handler),
+            QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT),
+            event_callbacks=SubscriptionEventCallbacks(
+                incompatible_qos=functools.partial(self._mismatch, name)
+            ),
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+        )
+
+    def add_output(self, message_type: Any, name: str, *, latched: bool = False) -> Publisher:
+        """Publish `~/name`, reliable.
+
+        Args:
+            message_type: Type of the messages.
+            name: Name of the topic, without `~/`.
+            latched: Whether who subscribes later gets the last message.
+        """
+        durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
+        return self.create_publisher(
+            message_type,
+            f"~/{name}",
+            QoSProfile(depth=1 if latched else DEPTH, durability=durability),
+            event_callbacks=PublisherEventCallbacks(
+                incompatible_qos=functools.partial(self._mismatch, name)
+            ),
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+        )
+
+    def report(self, what: str, sentence: str) -> None:
+        """Count something that is accepted but worth a look, and log it with a throttle."""
+        self.health.reported[what] += 1
+        self.get_logger().warning(sentence, throttle_duration_sec=LOG_PERIOD)
+
+    def _answer(
+        self, name: str, handler: Callable[[Any, Any], None], request: Any, response: Any
+    ) -> Any:
+        start = time.perf_counter()
+        try:
+            handler(request, response)
+            self.health.accepted[name] += 1
+        except Exception as error:
+            # Nothing of a half-filled answer may be taken for one.
+            response = type(response)(
+                error_code=answers.error_code(error), error_msg=self._refuse(name, error)
+            )
+        self.health.times.add(time.perf_counter() - start)
+        return response
+
+    def _take(self, name: str, handler: Callable[[Any], None], message: Any) -> None:
+        start = time.perf_counter()
+        try:
+            handler(message)
+            self.health.accepted[name] += 1
+            self.health.inputs[name].last = self.get_clock().now().nanoseconds
+        except Exception as error:
+            self._refuse(name, error)
+        self.health.times.add(time.perf_counter() - start)
+
+    def _refuse(self, name: str, error: Exception) -> str:
+        sentence = answers.sentence(error)
+        self.health.refuse(name, answers.code_name(error), sentence)
+        if isinstance(error, LimitSurfaceError):
+            self.get_logger().warning(f"{name}: {sentence}", throttle_duration_sec=LOG_PERIOD)
+        else:
+            lines = "".join(traceback.format_exception(error))
+            self.get_logger().error(f"{name}: {lines}", throttle_duration_sec=LOG_PERIOD)
+        return sentence
+
+    def _mismatch(self, name: str, event: Any) -> None:
+        self.health.qos_mismatches[name] += event.total_count_change
+        self.get_logger().warning(
+            f"{name}: a peer's QoS is incompatible and gets or gives nothing; "
+            f"last policy {event.last_policy_kind}"
+        )
+
+    def _reload(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            response.message = self.models.reload()
+            response.success = True
+            self.get_logger().info(response.message)
+        except Exception as error:
+            response.message = f"{self._refuse('reload', error)}; the old models keep serving"
+        return response

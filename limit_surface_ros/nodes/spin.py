@@ -1,0 +1,125 @@
+"""Run nodes until SIGINT or SIGTERM, and end with exit code 0, no traceback and no reply lost.
+
+The signals are blocked in all threads and awaited in one: no callback is cut in the middle, as
+rclpy's own handlers would do. What is being answered is answered; then the nodes end.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import threading
+import traceback
+from typing import TYPE_CHECKING, Any
+
+import rclpy
+import rclpy.logging
+from rclpy.exceptions import ParameterException
+from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+from rclpy.utilities import remove_ros_args
+
+from limit_surface_ros.errors import LimitSurfaceError
+from limit_surface_ros.nodes.settings import Setting
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from rclpy.node import Node
+
+ENDING = (signal.SIGINT, signal.SIGTERM)
+# What a user gets wrong at start is told in one line, without a traceback. rcl's errors, unknown
+# ROS arguments among them, are RuntimeErrors.
+_CONFIGURATION_ERRORS = (LimitSurfaceError, ParameterException, RuntimeError)
+EXECUTOR = Setting(
+    "executor",
+    "single_threaded",
+    "Executor of the process; `events` needs less of the processor and is experimental in rclpy",
+    choices=("single_threaded", "events"),
+    read_only=True,
+)
+
+
+def run(
+    make_nodes: Callable[[], Sequence[Node]], description: str, argv: Sequence[str]
+) -> int:
+    """Run the nodes of one process until they are told to end.
+
+    Args:
+        make_nodes: Makes the nodes; called with ROS initialised. Errors end the process with a
+            line in the log.
+        description: What the program is, for `--help`.
+        argv: The command line, the program's name first.
+
+    Returns:
+        The process's exit code: 0 after SIGINT or SIGTERM, 1 if the nodes could not start.
+    """
+    signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
+    parser = argparse.ArgumentParser(
+        description=description,
+        epilog="Parameters, remappings and the namespace are given as ROS arguments: "
+        "--ros-args -p NAME:=VALUE --params-file FILE -r FROM:=TO -r __ns:=/NAMESPACE",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.parse_args(remove_ros_args(list(argv))[1:])
+    try:
+        rclpy.init(args=list(argv), signal_handler_options=SignalHandlerOptions.NO)
+        nodes = make_nodes()
+    except _CONFIGURATION_ERRORS as error:
+        rclpy.logging.get_logger("limit_surface_ros").fatal(f"cannot start: {error}")
+        rclpy.try_shutdown()
+        return 1
+    executor = _executor(nodes[0])
+    for node in nodes:
+        executor.add_node(node)
+    _spin_until_signal(executor)
+    executor.shutdown()
+    for node in nodes:
+        node.destroy_node()
+    rclpy.try_shutdown()
+    return 0
+
+
+def _executor(node: Node) -> Executor:
+    if node.get_parameter(EXECUTOR.name).value == "events":
+        try:
+            from rclpy.experimental import EventsExecutor
+        except ImportError:
+            node.get_logger().warning("this rclpy has no EventsExecutor; single_threaded is used")
+        else:
+            return EventsExecutor()
+    return SingleThreadedExecutor()
+
+
+def _spin_until_signal(executor: Executor) -> None:
+    ended: Any = Future()
+
+    def wait() -> None:
+        signal.sigwait(ENDING)
+        # As a task it is run between callbacks, and wakes an executor that waits.
+        executor.create_task(ended.set_result, None)
+
+    waiter = threading.Thread(target=wait, daemon=True)
+    waiter.start()
+    while rclpy.ok() and not ended.done():
+        try:
+            _turn(executor, ended)
+        except Exception:
+            # A message that rclpy itself cannot convert must not end a node that serves others.
+            rclpy.logging.get_logger("limit_surface_ros").error(
+                f"while spinning: {traceback.format_exc()}", throttle_duration_sec=5.0
+            )
+    if not ended.done():
+        # The context was shut down from elsewhere: let the waiting thread go.
+        signal.pthread_kill(waiter.ident, signal.SIGTERM)
+    waiter.join()
+
+
+def _turn(executor: Executor, ended: Any) -> None:
+    if isinstance(executor, SingleThreadedExecutor):
+        # Its spin_until_future_complete would leave a callback behind at each turn.
+        executor.spin_once()
+    else:
+        # Without a timeout the EventsExecutor of rclpy 7.1.6 turns hot and deaf.
+        executor.spin_until_future_complete(ended, timeout_sec=3600.0)

@@ -1,0 +1,93 @@
+"""Transforms between frames that are given once, as texts; ROS-free.
+
+Each text reads `parent child x y z roll pitch yaw` or `parent child x y z qx qy qz qw`: the pose of
+the child in the parent, in [m] and [rad], as tf2's static_transform_publisher takes it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from limit_surface_ros.errors import FrameError, RangeError
+from limit_surface_ros.surface.rigid_transform import RigidTransform
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+ACCEPTED = "'parent child x y z roll pitch yaw' or 'parent child x y z qx qy qz qw'"
+
+
+class StaticTransforms:
+    """A tree of fixed frames.
+
+    Args:
+        texts: The edges of the tree; see the module's description.
+
+    Raises:
+        RangeError: A text is not understood, or a frame is given two parents or is its own
+            ancestor.
+    """
+
+    def __init__(self, texts: Iterable[str] = ()) -> None:
+        """Parse the edges and place each frame in the root of its tree."""
+        self._edges: dict[str, tuple[str, RigidTransform]] = {}
+        for text in texts:
+            parent, child, pose = _parsed(text)
+            if child in self._edges:
+                raise RangeError(
+                    f"frame {child!r} has two parents, {self._edges[child][0]!r} and {parent!r}"
+                )
+            self._edges[child] = parent, pose
+        parents = (parent for parent, _ in self._edges.values())
+        self._in_root = {frame: self._placed(frame) for frame in [*self._edges, *parents]}
+
+    def __contains__(self, frame: str) -> bool:
+        """Tell whether the frame is part of any tree."""
+        return frame in self._in_root
+
+    def look_up(self, target: str, source: str) -> RigidTransform:
+        """Return the transform that takes vectors from `source` to `target`.
+
+        Raises:
+            FrameError: A frame is unknown, or no chain of transforms joins the two.
+        """
+        for frame in (source, target):
+            if frame not in self._in_root:
+                raise FrameError(
+                    f"no transform from frame {source!r} to the model's frame {target!r} is "
+                    f"known: frame {frame!r} is in no static transform"
+                )
+        source_root, source_pose = self._in_root[source]
+        target_root, target_pose = self._in_root[target]
+        if source_root != target_root:
+            raise FrameError(
+                f"no transform from frame {source!r} to the model's frame {target!r} is known: "
+                "no chain of static transforms joins them"
+            )
+        return target_pose.inverse @ source_pose
+
+    def _placed(self, frame: str) -> tuple[str, RigidTransform]:
+        """Return the root above a frame and the frame's pose in it."""
+        pose = RigidTransform(np.eye(3), np.zeros(3))
+        seen = [frame]
+        while frame in self._edges:
+            frame, step = self._edges[frame]
+            if frame in seen:
+                raise RangeError(f"frame {frame!r} is its own ancestor: {' < '.join(seen)}")
+            seen.append(frame)
+            pose = step @ pose
+        return frame, pose
+
+
+def _parsed(text: str) -> tuple[str, str, RigidTransform]:
+    words = text.split()
+    try:
+        numbers = [float(word) for word in words[2:]]
+    except ValueError as error:
+        raise RangeError(f"{text!r}: {error}; accepted is {ACCEPTED}") from None
+    if len(numbers) not in (6, 7) or not np.isfinite(numbers).all():
+        raise RangeError(f"{text!r}: accepted is {ACCEPTED}, with finite numbers")
+    build = RigidTransform.from_euler if len(numbers) == 6 else RigidTransform.from_quaternion
+    return words[0], words[1], build(numbers[:3], numbers[3:])

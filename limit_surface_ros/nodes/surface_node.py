@@ -1,0 +1,95 @@
+"""The `limit_surface` node: wrench to twist and twist to wrench over services and topics."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from geometry_msgs.msg import TwistStamped, WrenchStamped
+from limit_surface_interfaces.srv import TwistToWrench, WrenchToTwist
+
+from limit_surface_ros.files.surface_file import SurfaceModel, read_surface_model
+from limit_surface_ros.nodes import convert, frames, planar_inputs
+from limit_surface_ros.nodes.model_host import model_settings
+from limit_surface_ros.nodes.model_node import ModelNode
+from limit_surface_ros.nodes.planar_inputs import PlanarInputs
+
+if TYPE_CHECKING:
+    from std_msgs.msg import Header
+
+NAME = "limit_surface"
+SETTINGS = (
+    *model_settings("config/models", "limit surfaces"),
+    *frames.SETTINGS,
+    *planar_inputs.SETTINGS,
+)
+
+
+class LimitSurfaceNode(ModelNode[SurfaceModel]):
+    """Serves the two maps of limit surfaces.
+
+    Args:
+        options: Passed on to `rclpy.node.Node`.
+
+    Raises:
+        LimitSurfaceError: A parameter or a model file is not accepted.
+        ParameterException: A parameter has the wrong type or lies outside its range.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        """Read the models and start serving."""
+        super().__init__(NAME, SETTINGS, read_surface_model, **options)
+        self._inputs = PlanarInputs(self.values, frames.Frames(self, self.values), self.report)
+        self._twists = self.add_output(TwistStamped, "predicted_twist")
+        self._wrenches = self.add_output(WrenchStamped, "required_wrench")
+        self.add_service(WrenchToTwist, "wrench_to_twist", self._wrench_to_twist)
+        self.add_service(TwistToWrench, "twist_to_wrench", self._twist_to_wrench)
+        self.add_input(WrenchStamped, "wrench", self._predict)
+        self.add_input(TwistStamped, "twist", self._require)
+
+    def _wrench_to_twist(
+        self, request: WrenchToTwist.Request, response: WrenchToTwist.Response
+    ) -> None:
+        model = self.models[request.model]
+        load = self._inputs.wrench(model, request.wrench)
+        surface = load.surface
+        factor = float(surface.load_factor(load.vector))
+        twist = surface.twist_of_wrench(load.vector)
+        convert.fill_twist(response.twist.twist, twist)
+        convert.fill_wrench(response.limit_wrench.wrench, load.vector / factor)
+        response.load_factor = factor
+        response.slides = factor >= 1.0
+        for stamped in (response.twist, response.limit_wrench):
+            _head(stamped.header, request.wrench.header, model)
+
+    def _twist_to_wrench(
+        self, request: TwistToWrench.Request, response: TwistToWrench.Response
+    ) -> None:
+        model = self.models[request.model]
+        motion = self._inputs.twist(model, request.twist)
+        wrench = motion.surface.wrench_of_twist(motion.vector)
+        convert.fill_wrench(response.wrench.wrench, wrench)
+        response.power = float(wrench @ motion.vector)
+        _head(response.wrench.header, request.twist.header, model)
+
+    def _predict(self, message: WrenchStamped) -> None:
+        model = self.models[""]
+        load = self._inputs.wrench(model, message)
+        answer = TwistStamped()
+        if load.surface.load_factor(load.vector) >= 1.0:
+            convert.fill_twist(answer.twist, load.surface.twist_of_wrench(load.vector))
+        _head(answer.header, message.header, model)
+        self._twists.publish(answer)
+
+    def _require(self, message: TwistStamped) -> None:
+        model = self.models[""]
+        motion = self._inputs.twist(model, message)
+        answer = WrenchStamped()
+        convert.fill_wrench(answer.wrench, motion.surface.wrench_of_twist(motion.vector))
+        _head(answer.header, message.header, model)
+        self._wrenches.publish(answer)
+
+
+def _head(header: Header, asked: Header, model: SurfaceModel) -> None:
+    """Answers keep the stamp that they answer and stand in the model's frame."""
+    header.stamp = asked.stamp
+    header.frame_id = model.frame_id

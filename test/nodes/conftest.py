@@ -1,0 +1,165 @@
+"""Real nodes in this process, spun in a thread; tests wait on what happens, never on time."""
+
+from __future__ import annotations
+
+import os
+import socket
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
+from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.scaling import Scaling
+
+WAIT = 20.0
+
+
+def _own_domain() -> tuple[int, socket.socket]:
+    """Return a ROS domain that no other test run on this machine has, and what keeps it."""
+    for domain in range(1, 101):
+        lock = socket.socket()
+        try:
+            lock.bind(("127.0.0.1", 22119 + domain))
+        except OSError:
+            lock.close()
+        else:
+            return domain, lock
+    raise RuntimeError("all ROS domains are taken by other test runs")
+
+
+_DOMAIN, _LOCK = _own_domain()
+os.environ["ROS_DOMAIN_ID"] = str(_DOMAIN)
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
+
+class Spinner:
+    """A context with an executor in a thread."""
+
+    def __init__(self) -> None:
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.nodes: list = []
+        self._changed = threading.Condition()
+        self._thread = threading.Thread(target=self.executor.spin)
+        self._thread.start()
+
+    def add(self, make, *args, parameters=None, files=None, remap=(), namespace=None):
+        """Make a node with parameters (a dict) and spin it."""
+        from rclpy.parameter import Parameter
+
+        values = dict(parameters or {})
+        if files is not None:
+            values["model_files"] = [str(path) for path in files]
+        overrides = []
+        for name, value in values.items():
+            kind = Parameter.Type.STRING_ARRAY if value == [] else None
+            overrides.append(Parameter(name, kind, value))
+        cli = ["--ros-args", *(part for rule in remap for part in ("-r", rule))]
+        node = make(
+            *args,
+            context=self.context,
+            parameter_overrides=overrides,
+            namespace=namespace,
+            cli_args=cli if remap else None,
+        )
+        self.nodes.append(node)
+        self.executor.add_node(node)
+        return node
+
+    def client(self, node, service_type, name):
+        """Return a function that calls a service and waits for the answer."""
+        client = node.create_client(service_type, name)
+        assert client.wait_for_service(timeout_sec=WAIT), f"no service {name}"
+        return lambda request, timeout=WAIT: self.result(client.call_async(request), timeout)
+
+    def result(self, future, timeout=WAIT):
+        """Wait for a future, outside the executor's thread, and return its result."""
+        done = threading.Event()
+        future.add_done_callback(lambda _: done.set())
+        assert done.wait(timeout), "no answer"
+        return future.result()
+
+    def listen(self, node, message_type, topic, qos=10):
+        """Subscribe and return the list that the messages are put in; see `wait`."""
+        received: list = []
+
+        def take(message) -> None:
+            with self._changed:
+                received.append(message)
+                self._changed.notify_all()
+
+        node.create_subscription(message_type, topic, take, qos)
+        return received
+
+    def wait(self, condition, timeout=WAIT):
+        """Wait until a condition holds; it is looked at when a message came, or 50 times a second.
+
+        What a node counts cannot notify, hence the second.
+        """
+        import time
+
+        end = time.monotonic() + timeout
+        with self._changed:
+            while not condition():
+                left = end - time.monotonic()
+                assert left > 0.0, "the condition did not come true"
+                self._changed.wait(min(left, 0.02))
+
+    def matched(self, publisher, count=1):
+        """Wait until a publisher has its subscribers."""
+        self.wait(lambda: publisher.get_subscription_count() >= count)
+
+    def close(self) -> None:
+        """End the thread first: a process must not end while one spins."""
+        self.executor.shutdown()
+        self._thread.join()
+        for node in self.nodes:
+            node.destroy_node()
+        self.context.try_shutdown()
+
+
+@pytest.fixture
+def ros():
+    pytest.importorskip("rclpy", reason="rclpy is not installed: source a Jazzy or use make test")
+    pytest.importorskip(
+        "limit_surface_interfaces", reason="the interfaces are not built: use make test"
+    )
+    spinner = Spinner()
+    yield spinner
+    spinner.close()
+
+
+@pytest.fixture
+def client_node(ros):
+    import rclpy
+
+    return ros.add(lambda **options: rclpy.create_node("client", **options))
+
+
+def surface_of(seed: int, terms: int = 3) -> PowerSum:
+    """Return a random surface of the thesis's family."""
+    rng = np.random.default_rng(seed)
+    factors = rng.normal(size=(terms, 3, 3))
+    matrices = factors @ factors.transpose(0, 2, 1) + 0.1 * np.eye(3)
+    return PowerSum.thesis(matrices, Scaling(0.05, 2.0))
+
+
+@pytest.fixture
+def model_file(tmp_path):
+    """Return a function that writes a model file and returns model and path."""
+
+    def write(name="box", seed=0, folder: Path = tmp_path, **fields):
+        terms = fields.pop("terms", 3)
+        model = SurfaceModel(name=name, surface=surface_of(seed, terms), **fields)
+        path = folder / f"{name}.yaml"
+        write_surface_model(model, path)
+        return model, path
+
+    return write

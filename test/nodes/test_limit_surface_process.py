@@ -1,0 +1,70 @@
+"""The limit_surface program: starts, serves other processes, and ends without a traceback."""
+
+from __future__ import annotations
+
+import signal
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
+
+from limit_surface_interfaces.srv import WrenchToTwist
+from node_helpers import Program, planar_twist, wrench_message
+
+
+def started(path, *arguments):
+    """Start the node's program on one model file."""
+    return Program(
+        "limit_surface_node",
+        "--ros-args",
+        "-p",
+        f"model_files:=['{path}']",
+        *arguments,
+    )
+
+
+@pytest.mark.parametrize("executor", ["single_threaded", "events"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_another_process_is_served_until_a_signal_ends_it_cleanly(
+    ros, client_node, model_file, number, executor
+):
+    model, path = model_file()
+    with started(path, "-p", f"executor:={executor}") as program:
+        call = ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
+        answer = call(WrenchToTwist.Request(wrench=wrench_message([3.0, 1.0, 0.1])))
+        expected = model.surface.twist_of_wrench([3.0, 1.0, 0.1])
+        np.testing.assert_allclose(planar_twist(answer.twist), expected, atol=1e-12)
+        code, output = program.end(number)
+    assert code == 0, output
+    assert "Traceback" not in output
+    assert "terminate" not in output
+
+
+@pytest.mark.parametrize(
+    ("broken", "told"),
+    [
+        ("model_files:=['/nowhere/box.yaml']", "/nowhere/box.yaml"),
+        ("default_model:=sofa", "sofa"),
+        ("input_timeout:=-1.0", "input_timeout"),
+        ("input_timeout:=.nan", "input_timeout"),
+        ("normal_force_from:=moon", "normal_force_from"),
+        ("static_transforms:=['a b 1 2']", "static_transforms"),
+        ("out_of_plane_tolerance:=text", "out_of_plane_tolerance"),
+    ],
+)
+def test_a_bad_parameter_at_start_is_told_in_one_line(ros, model_file, broken, told):
+    _, path = model_file()
+    with started(path, "-p", broken) as program:
+        code, output = program.ended()
+    assert code == 1
+    assert told in output
+    assert "Traceback" not in output
+
+
+def test_help_teaches_how_to_give_parameters():
+    with Program("limit_surface_node", "--help") as program:
+        code, output = program.ended()
+    assert code == 0
+    assert "--params-file" in output
