@@ -24,6 +24,8 @@ PROGRAMS: dict[str, str] = {
     "compare_decays": "limit_surface_ros.tools.compare_decays",
     "plot_surface": "limit_surface_ros.tools.plot_surface",
     "reproduce_thesis": "limit_surface_ros.tools.reproduce_thesis",
+    "demo": "limit_surface_ros.nodes.demo",
+    "limit_surface_node": "limit_surface_ros.nodes.limit_surface_node",
 }
 
 

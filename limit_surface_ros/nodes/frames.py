@@ -7,7 +7,7 @@ package index) the static transforms of the node's parameter are all there is.
 from __future__ import annotations
 
 import importlib.util
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rclpy.time import Time
 
@@ -17,12 +17,12 @@ from limit_surface_ros.nodes.static_transforms import StaticTransforms
 from limit_surface_ros.surface.rigid_transform import RigidTransform
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
     from rclpy.node import Node
     from std_msgs.msg import Header
 
-    from limit_surface_ros.nodes.parameters import Parameters
+    from limit_surface_ros.nodes.parameters import Parameters, Values
 
 SETTINGS = (
     Setting(
@@ -86,7 +86,7 @@ class Frames:
             return self._buffer.look_up(target, source, header)
         return self._static.look_up(target, source)
 
-    def _prepare(self, values: Mapping[str, Any]) -> Callable[[], None]:
+    def _prepare(self, values: Values) -> Callable[[], None]:
         static = StaticTransforms(values["static_transforms"])
 
         def apply() -> None:

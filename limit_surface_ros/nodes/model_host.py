@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic
+from typing import TYPE_CHECKING, Generic
 
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 
-from limit_surface_ros.errors import FileError, LimitSurfaceError
+from limit_surface_ros.errors import FileError
 from limit_surface_ros.files.model_set import Model, ModelSet, read_model_set
 from limit_surface_ros.nodes.settings import Setting
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable
 
-    from limit_surface_ros.nodes.parameters import Parameters
+    from limit_surface_ros.nodes.parameters import Parameters, Values
 
 _IN_PACKAGE = "package://"
 
@@ -72,7 +72,7 @@ class ModelHost(Generic[Model]):
         Raises:
             LimitSurfaceError: A file is not valid; the old models keep serving.
         """
-        self._prepare({name: self._parameters[name] for name in ("model_files", "default_model")})()
+        self._prepare(self._parameters)()
         return self.summary
 
     @property
@@ -81,7 +81,7 @@ class ModelHost(Generic[Model]):
         names = ", ".join(model.name for model in self.models)
         return f"{len(self.models)} loaded: {names}; default {self.models.default}"
 
-    def _prepare(self, values: Mapping[str, Any]) -> Callable[[], None]:
+    def _prepare(self, values: Values) -> Callable[[], None]:
         paths = resolved(values["model_files"])
         models = read_model_set(paths, self._read, values["default_model"])
 

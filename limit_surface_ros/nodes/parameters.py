@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -15,18 +15,26 @@ from rclpy.parameter import Parameter
 from limit_surface_ros.errors import LimitSurfaceError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Mapping
+    from collections.abc import Callable, Collection, Iterable
 
     from rclpy.node import Node
 
     from limit_surface_ros.nodes.settings import Setting
 
     # Gets the values as they would be; raises to refuse them, returns what makes them count.
-    Prepare = Callable[[Mapping[str, Any]], Callable[[], None]]
+    Prepare = Callable[["Values"], Callable[[], None]]
 
 # Of numbers without an upper bound; a descriptor's range has two ends.
 _LARGEST = 1.0e300
 _LARGEST_INTEGER = 2**53
+
+
+class Values(Protocol):
+    """Values of parameters by name."""
+
+    def __getitem__(self, name: str, /) -> Any:
+        """Return one."""
+        ...
 
 
 class Parameters:

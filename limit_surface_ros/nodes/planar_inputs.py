@@ -158,5 +158,7 @@ def _vector(what: str, six: Sequence[float]) -> Floats:
     """Return the planar part; a zero one is for the surface to accept or refuse."""
     vector = planar(six)
     if 0.0 < max(map(abs, vector)) < convert.SMALLEST:
-        raise RangeError(f"{what} is below {convert.SMALLEST:g} in size, too small for a direction")
+        raise RangeError(
+            f"{what} is below {convert.SMALLEST:g} in size, too small for a direction"
+        )
     return np.array(vector)

@@ -41,9 +41,7 @@ EXECUTOR = Setting(
 )
 
 
-def run(
-    make_nodes: Callable[[], Sequence[Node]], description: str, argv: Sequence[str]
-) -> int:
+def run(make_nodes: Callable[[], Sequence[Node]], description: str, argv: Sequence[str]) -> int:
     """Run the nodes of one process until they are told to end.
 
     Args:

@@ -1,7 +1,7 @@
 """Transforms between frames that are given once, as texts; ROS-free.
 
-Each text reads `parent child x y z roll pitch yaw` or `parent child x y z qx qy qz qw`: the pose of
-the child in the parent, in [m] and [rad], as tf2's static_transform_publisher takes it.
+Each text reads `parent child x y z roll pitch yaw` or `parent child x y z qx qy qz qw`: the pose
+of the child in the parent, in [m] and [rad].
 """
 
 from __future__ import annotations

@@ -5,13 +5,21 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from geometry_msgs.msg import TwistStamped, WrenchStamped
-from limit_surface_interfaces.srv import TwistToWrench, WrenchToTwist
+from limit_surface_interfaces.srv import (
+    ListModels,
+    TwistsToWrenches,
+    TwistToWrench,
+    WrenchesToTwists,
+    WrenchToTwist,
+)
 
 from limit_surface_ros.files.surface_file import SurfaceModel, read_surface_model
 from limit_surface_ros.nodes import convert, frames, planar_inputs
 from limit_surface_ros.nodes.model_host import model_settings
+from limit_surface_ros.nodes.model_info import model_info
 from limit_surface_ros.nodes.model_node import ModelNode
 from limit_surface_ros.nodes.planar_inputs import PlanarInputs
+from limit_surface_ros.surface.planar import power
 
 if TYPE_CHECKING:
     from std_msgs.msg import Header
@@ -43,6 +51,9 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
         self._wrenches = self.add_output(WrenchStamped, "required_wrench")
         self.add_service(WrenchToTwist, "wrench_to_twist", self._wrench_to_twist)
         self.add_service(TwistToWrench, "twist_to_wrench", self._twist_to_wrench)
+        self.add_service(WrenchesToTwists, "wrenches_to_twists", self._wrenches_to_twists)
+        self.add_service(TwistsToWrenches, "twists_to_wrenches", self._twists_to_wrenches)
+        self.add_service(ListModels, "list_models", self._list_models)
         self.add_input(WrenchStamped, "wrench", self._predict)
         self.add_input(TwistStamped, "twist", self._require)
 
@@ -70,6 +81,28 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
         convert.fill_wrench(response.wrench.wrench, wrench)
         response.power = float(wrench @ motion.vector)
         _head(response.wrench.header, request.twist.header, model)
+
+    def _wrenches_to_twists(
+        self, request: WrenchesToTwists.Request, response: WrenchesToTwists.Response
+    ) -> None:
+        surface = self._inputs.surface(self.models[request.model])
+        wrenches = convert.rows_of("wrenches", request.wrenches)
+        response.twists = convert.flat_of(surface.twist_of_wrench(wrenches))
+        response.load_factors = convert.flat_of(surface.load_factor(wrenches))
+
+    def _twists_to_wrenches(
+        self, request: TwistsToWrenches.Request, response: TwistsToWrenches.Response
+    ) -> None:
+        surface = self._inputs.surface(self.models[request.model])
+        twists = convert.rows_of("twists", request.twists)
+        wrenches = surface.wrench_of_twist(twists)
+        response.wrenches = convert.flat_of(wrenches)
+        response.powers = convert.flat_of(power(wrenches, twists))
+
+    def _list_models(self, _: ListModels.Request, response: ListModels.Response) -> None:
+        default = self.models.models.default
+        infos = [model_info(model, model.name == default) for model in self.models.models]
+        response.models = sorted(infos, key=lambda info: not info.is_default)
 
     def _predict(self, message: WrenchStamped) -> None:
         model = self.models[""]

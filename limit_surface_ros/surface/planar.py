@@ -5,8 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from limit_surface_ros.checks import Floats
 
 
 def planar(six: Sequence[float]) -> tuple[float, float, float]:
@@ -33,3 +37,16 @@ def out_of_plane(six: Sequence[float], length: float, *, pressing: bool = False)
     if left_out == 0.0:
         return 0.0
     return left_out / max(math.hypot(six[0], six[1], six[5] * length), 1e-300)
+
+
+def power(wrench: Floats, twist: Floats) -> Floats:
+    """Return the power wrench . twist [W].
+
+    Args:
+        wrench: Shape (..., 3), (fx, fy, tau_z) in [N, N, N m].
+        twist: Shape (..., 3), (vx, vy, omega_z) in [m/s, m/s, rad/s].
+
+    Returns:
+        Shape (...).
+    """
+    return np.asarray(np.einsum("...i,...i->...", wrench, twist))

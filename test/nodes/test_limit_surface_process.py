@@ -11,6 +11,7 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
 
 from limit_surface_interfaces.srv import WrenchToTwist
+
 from node_helpers import Program, planar_twist, wrench_message
 
 

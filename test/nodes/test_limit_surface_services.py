@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,11 +11,13 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
 
+from ament_index_python.packages import get_package_share_directory
 from limit_surface_interfaces.msg import ErrorCode
-from limit_surface_interfaces.srv import TwistToWrench, WrenchToTwist
-from node_helpers import STAMP, planar_twist, planar_wrench, twist_message, wrench_message
+from limit_surface_interfaces.srv import ListModels, TwistToWrench, WrenchToTwist
 
+from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
+from node_helpers import STAMP, planar_twist, planar_wrench, twist_message, wrench_message
 
 
 @pytest.fixture
@@ -133,3 +136,19 @@ def test_two_nodes_under_two_namespaces_do_not_meet(ros, client_node, model_file
         other = ({*models} - {namespace}).pop()
         refused = call(WrenchToTwist.Request(model=other, wrench=wrench_message(wrench)))
         assert refused.error_code == ErrorCode.UNKNOWN_MODEL
+
+
+def test_the_shipped_default_model_answers_within_1e_9_of_the_library(ros, client_node):
+    ros.add(LimitSurfaceNode)
+    listed = ros.client(client_node, ListModels, "/limit_surface/list_models")
+    default = listed(ListModels.Request()).models[0]
+    assert default.is_default
+    shared = Path(get_package_share_directory("limit_surface_ros"))
+    model = read_surface_model(shared / "config" / "models" / f"{default.name}.yaml")
+    call = ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
+    rng = np.random.default_rng(2)
+    for wrench in rng.normal(size=(50, 3)) * [1.0, 1.0, 0.1]:
+        answer = call(WrenchToTwist.Request(wrench=wrench_message(wrench, frame=default.frame_id)))
+        expected = model.surface.twist_of_wrench(wrench)
+        np.testing.assert_allclose(planar_twist(answer.twist), expected, rtol=1e-9, atol=1e-9)
+        assert answer.load_factor == pytest.approx(model.surface.load_factor(wrench), rel=1e-9)

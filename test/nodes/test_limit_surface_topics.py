@@ -11,9 +11,9 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
 
 from geometry_msgs.msg import TwistStamped, WrenchStamped
-from node_helpers import STAMP, planar_twist, planar_wrench, twist_message, wrench_message
 
 from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
+from node_helpers import STAMP, planar_twist, planar_wrench, twist_message, wrench_message
 
 
 @pytest.fixture

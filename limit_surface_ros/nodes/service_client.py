@@ -1,0 +1,67 @@
+"""Call services from a program: a node spun in a thread, plain calls that wait for the answer."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Any
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+
+class ServiceClient:
+    """A client node of its own; use it in a `with` block, which ends its thread.
+
+    Args:
+        name: Name of the node.
+    """
+
+    def __init__(self, name: str) -> None:
+        """Start the node and its thread."""
+        self._context = rclpy.Context()
+        rclpy.init(context=self._context)
+        self.node = rclpy.create_node(name, context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._thread = threading.Thread(target=self._executor.spin)
+        self._thread.start()
+        self._clients: dict[str, Any] = {}
+
+    def __enter__(self) -> ServiceClient:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """End the thread first: a process that ends while it spins aborts."""
+        self._executor.shutdown()
+        self._thread.join()
+        self.node.destroy_node()
+        self._context.try_shutdown()
+
+    def call(self, service_type: Any, name: str, request: Any, timeout: float = 10.0) -> Any:
+        """Call a service and return its answer.
+
+        Raises:
+            TimeoutError: There is no such service, or it does not answer in time [s].
+        """
+        client = self._clients.get(name)
+        if client is None:
+            client = self.node.create_client(service_type, name)
+            if not client.wait_for_service(timeout_sec=timeout):
+                raise TimeoutError(f"there is no service {name} after {timeout:g} s")
+            self._clients[name] = client
+        answered = threading.Event()
+        future = client.call_async(request)
+        future.add_done_callback(lambda _: answered.set())
+        if not answered.wait(timeout):
+            client.remove_pending_request(future)
+            raise TimeoutError(f"service {name} did not answer within {timeout:g} s")
+        return future.result()

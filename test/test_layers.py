@@ -1,0 +1,112 @@
+"""Layers hold: a module imports only from its own layer and those below; only nodes know ROS."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import limit_surface_ros
+
+PACKAGE = "limit_surface_ros"
+ROOT = Path(limit_surface_ros.__file__).parent
+LAYERS = ["surface", "fitting", "decay", "files"]
+TOPS = ["nodes", "tools", "plots"]
+ROS = {
+    "rclpy",
+    "ament_index_python",
+    "limit_surface_interfaces",
+    "builtin_interfaces",
+    "diagnostic_msgs",
+    "geometry_msgs",
+    "rcl_interfaces",
+    "std_msgs",
+    "std_srvs",
+    "tf2_ros",
+    "visualization_msgs",
+}
+MODULES = sorted(ROOT.rglob("*.py"))
+
+
+def layer_of(parts: tuple[str, ...]) -> str:
+    """Return the layer of a module's path inside the package; "" for errors and checks."""
+    return parts[0] if len(parts) > 1 else ""
+
+
+def allowed(layer: str) -> set[str]:
+    """Return the layers that a layer may import from."""
+    if layer == "":
+        return {""}
+    if layer in TOPS:
+        return {"", *LAYERS, layer}
+    return {"", *LAYERS[: LAYERS.index(layer) + 1]}
+
+
+def imported(path: Path) -> list[str]:
+    """Return the dotted names that a module imports, wherever it does."""
+    names = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            names += [f"{node.module}.{alias.name}" for alias in node.names]
+    return names
+
+
+def dotted(path: Path) -> str:
+    """Return the name by which a module is imported."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join((PACKAGE, *parts)).removesuffix(".__init__")
+
+
+def own_layer(name: str) -> str | None:
+    """Return the layer of an import from this package, None for others."""
+    first, *rest = name.split(".")
+    if first != PACKAGE:
+        return None
+    return rest[0] if rest and (ROOT / rest[0]).is_dir() else ""
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_module_imports_only_from_its_own_layer_and_those_below(path):
+    layer = layer_of(path.relative_to(ROOT).parts)
+    for name in imported(path):
+        below = own_layer(name)
+        assert below is None or below in allowed(layer), f"{layer or 'base'} imports {name}"
+        if layer != "nodes":
+            assert name.split(".")[0] not in ROS, f"{layer or 'base'} imports {name}"
+
+
+def test_nodes_never_import_what_fits():
+    for path in MODULES:
+        if layer_of(path.relative_to(ROOT).parts) == "nodes":
+            assert not [name for name in imported(path) if own_layer(name) == "fitting"]
+
+
+def run(code: str) -> None:
+    """Run code in an interpreter of its own."""
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_everything_but_nodes_imports_with_ros_blocked():
+    modules = [
+        dotted(path) for path in MODULES if layer_of(path.relative_to(ROOT).parts) != "nodes"
+    ]
+    run(
+        f"import sys\nfor name in {sorted(ROS)}:\n    sys.modules[name] = None\n"
+        f"import importlib\nfor name in {modules}:\n    importlib.import_module(name)\n"
+    )
+
+
+def test_nodes_start_without_what_is_slow_to_import():
+    pytest.importorskip("rclpy", reason="rclpy is not installed")
+    pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
+    run(
+        "import sys\nimport limit_surface_ros.nodes.limit_surface_node\n"
+        "slow = {'scipy.optimize', 'scipy.spatial', 'matplotlib', 'limit_surface_ros.fitting'}\n"
+        "assert not slow & set(sys.modules), slow & set(sys.modules)\n"
+    )
