@@ -1,0 +1,93 @@
+"""Draw a decay model: response and fit, error, rates in the complex plane, projection."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from limit_surface_ros.decay.examples import EXAMPLES, example
+from limit_surface_ros.errors import FileError
+from limit_surface_ros.files.decay_file import read_decay_model
+from limit_surface_ros.files.response_csv import read_response
+from limit_surface_ros.plots.canvas import SUFFIXES, save_figure
+from limit_surface_ros.plots.decay_view import PROJECTION, draw_decay
+from limit_surface_ros.tools.program import run_program
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from limit_surface_ros.decay.targets import Target
+    from limit_surface_ros.files.decay_file import DecayModel
+
+EPILOG = f"""\
+The projection goes {PROJECTION:g} times as far as the fit. The response is the one that the model
+file names as its source, if that is an example or a file that is still there.
+
+examples:
+  plot_decay hockey_stick.yaml
+  plot_decay relaxation.yaml --response relaxation.csv --output relaxation.svg
+"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
+    top = argparse.ArgumentParser(
+        prog="plot_decay",
+        description=__doc__,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    top.add_argument("model", type=Path, metavar="MODEL", help="model file (.yaml)")
+    top.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        default=Path("decay.png"),
+        help=f"picture to write: {', '.join(SUFFIXES)} (%(default)s)",
+    )
+    top.add_argument(
+        "--response",
+        metavar="X",
+        help=f"what the model stands for: an example ({', '.join(EXAMPLES)}) or a CSV file",
+    )
+    top.add_argument("--time-column", metavar="NAME", help="default: the first column")
+    top.add_argument("--value-column", metavar="NAME", help="default: the second column")
+    return top
+
+
+def response_of(model: DecayModel, options: argparse.Namespace) -> Target | None:
+    """Return the response that the options or the model name; None if there is none.
+
+    Raises:
+        FileError: The options name neither an example nor a readable record.
+    """
+    name = options.response or str(model.fit.get("source", ""))
+    if name in EXAMPLES:
+        return example(name)
+    path = Path(name)
+    if path.is_file():
+        return read_response(path, options.time_column, options.value_column)
+    if options.response:
+        raise FileError(
+            f"{path}: no such file, and no example has that name; examples are "
+            f"{', '.join(EXAMPLES)}"
+        )
+    return None
+
+
+def run(options: argparse.Namespace) -> None:
+    """Read, draw, write."""
+    model = read_decay_model(options.model)
+    save_figure(draw_decay(model, response_of(model, options)), options.output)
+    print(f"written     {options.output}")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the program and return its exit code."""
+    return run_program(parser(), run, argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,116 @@
+"""The promises of plot_surface, plot_decay and reproduce_thesis as programs."""
+
+import numpy as np
+import pytest
+
+from limit_surface_ros.files.decay_file import read_decay_model
+from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
+from limit_surface_ros.plots.decay_view import draw_decay
+from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.tools import fit_decay, plot_decay, plot_surface, reproduce_thesis
+
+pytest.importorskip("matplotlib", reason="matplotlib draws the pictures")
+
+
+@pytest.fixture
+def surface_file(tmp_path):
+    path = tmp_path / "disc.yaml"
+    write_surface_model(SurfaceModel("disc", PowerSum.norms([np.diag([1.0, 1.0, 2.0])])), path)
+    return path
+
+
+@pytest.fixture
+def decay_file(tmp_path):
+    path = tmp_path / "stick.yaml"
+    arguments = ["f1", "--terms", "5", "--method", "neutral", "--output", str(path)]
+    assert fit_decay.main(arguments) == 0
+    return path
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+def test_plot_surface_writes_the_picture_it_is_asked_for(tmp_path, surface_file, suffix):
+    picture = tmp_path / f"disc.{suffix}"
+    assert plot_surface.main([str(surface_file), "--output", str(picture)]) == 0
+    start = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[suffix]
+    assert picture.read_bytes().startswith(start)
+
+
+def test_two_models_of_one_name_cannot_be_told_apart(tmp_path, surface_file, capsys):
+    assert plot_surface.main([str(surface_file), str(surface_file)]) == 2
+    assert "another file holds a model named 'disc'" in capsys.readouterr().err
+
+
+def test_a_model_that_is_not_there_is_one_line_and_no_picture(tmp_path, capsys):
+    picture = tmp_path / "x.png"
+    absent = str(tmp_path / "absent.yaml")
+    for program in (plot_surface, plot_decay):
+        assert program.main([absent, "--output", str(picture)]) == 2
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1
+        assert "absent.yaml" in error
+    assert not picture.exists()
+
+
+def test_plot_decay_finds_the_response_that_the_model_was_fitted_to(tmp_path, decay_file):
+    picture = tmp_path / "stick.png"
+    assert plot_decay.main([str(decay_file), "--output", str(picture)]) == 0
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    options = plot_decay.parser().parse_args([str(decay_file)])
+    target = plot_decay.response_of(read_decay_model(decay_file), options)
+    np.testing.assert_allclose(target([0.0, 0.5, 2.0]), [1.0, 0.5, 0.0])
+
+
+def test_a_decay_is_drawn_with_error_rates_and_projection(decay_file):
+    model = read_decay_model(decay_file)
+    options = plot_decay.parser().parse_args([str(decay_file)])
+    target = plot_decay.response_of(model, options)
+    above, rates, below, projection = draw_decay(model, target).axes
+    error = below.get_lines()[0].get_ydata()
+    assert np.abs(error).max() == pytest.approx(model.max_error, rel=0.02)
+    points = sum(len(group.get_offsets()) for group in rates.collections)
+    assert points == model.sum.terms
+    assert projection.get_xlim() == (0.0, 18.0)
+    assert above.get_xlabel() == "t [s]"
+
+
+def test_without_a_response_only_the_model_is_drawn(decay_file):
+    above, _, below, _ = draw_decay(read_decay_model(decay_file)).axes
+    assert [line.get_label() for line in above.get_lines()] == ["model"]
+    assert "not known" in below.get_title()
+
+
+def test_a_response_that_does_not_exist_lists_the_examples(decay_file, capsys):
+    assert plot_decay.main([str(decay_file), "--response", "f9"]) == 2
+    assert "examples are f1, f2" in capsys.readouterr().err
+
+
+def test_reproduce_thesis_makes_the_figures_it_is_asked_for(tmp_path, capsys):
+    out = tmp_path / "a folder" / "out"
+    assert reproduce_thesis.main([str(out), "--quick", "--figures", "2.1", "3.2"]) == 0
+    assert sorted(path.name for path in out.iterdir()) == [
+        "figure_2_01",
+        "figure_3_02",
+        "index.html",
+    ]
+    assert str(out / "index.html") in capsys.readouterr().out
+
+
+def test_a_figure_that_the_thesis_does_not_have_is_refused(tmp_path, capsys):
+    assert reproduce_thesis.main([str(tmp_path / "out"), "--figures", "3.99"]) == 2
+    assert "there is no figure 3.99; there are 2.1" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(tmp_path, capsys):
+    blocker = tmp_path / "file"
+    blocker.write_text("")
+    assert reproduce_thesis.main([str(blocker / "out"), "--quick"]) == 2
+    assert "cannot be made" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("program", [plot_surface, plot_decay, reproduce_thesis])
+def test_help_gives_examples(program, capsys):
+    with pytest.raises(SystemExit) as done:
+        program.main(["--help"])
+    assert done.value.code == 0
+    assert "examples:" in capsys.readouterr().out
