@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from limit_surface_ros.decay.delay_system import DelaySystem, from_quasi_polynomial
+from limit_surface_ros.decay.pieces import PiecewisePolynomial
 from limit_surface_ros.decay.targets import Analytic, PiecewiseLinear, Target
 from limit_surface_ros.errors import RangeError
 
@@ -23,6 +24,17 @@ THESIS_EQUATION = (
     (0.0, -0.0186, -0.0195, -0.9356, -4.6128, -9.144, -18.036),
     (0.0, 0.1547, 0.1543, 0.085, 0.7254, 2.5824, 5.076),
     (0.0, -0.0841, -0.0705, -0.0344, 0.0672, 0.1848, -0.132),
+)
+
+# Highest power of t first. The first row is as (2.4) implies it; (2.2) misprints four of its
+# coefficients.
+THESIS_POLYNOMIALS = (
+    (-0.0137, -0.0345, -0.1692, -0.4960, -0.9956, -0.9970),
+    (0.0657, -0.2321, 0.6695, -0.6433, 0.1583, -0.7332),
+    (-0.1230, 1.1803, -4.7502, 10.1286, -10.9627, 4.2296),
+    (0.1091, -1.7157, 10.7465, -33.6881, 53.2784, -34.3779),
+    (-0.0411, 0.9092, -7.9743, 34.6855, -74.7489, 63.7709),
+    (0.0010, -0.0407, 0.5696, -3.8203, 12.4353, -15.8333),
 )
 
 
@@ -95,6 +107,16 @@ def example(name: str) -> Target:
 def thesis_system() -> DelaySystem:
     """Return the delay system of the hockey stick as the thesis prints it (2.4): basis 1."""
     return from_quasi_polynomial(THESIS_EQUATION)
+
+
+def printed_system() -> DelaySystem:
+    """Return the hockey stick's system from the polynomials that the thesis prints, (2.2).
+
+    Four decimals of monomials far from their cell are few: the last cells miss the kernel by up
+    to 0.7, where it is below 0.005.
+    """
+    pieces = PiecewisePolynomial.from_monomials(np.arange(7.0), THESIS_POLYNOMIALS)
+    return DelaySystem(np.array([0.0, 1.0]), np.array([-1.0, 1.0]), pieces)
 
 
 def simple_system() -> DelaySystem:

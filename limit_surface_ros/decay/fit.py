@@ -14,6 +14,7 @@ from limit_surface_ros.decay.rates_esprit import esprit_rates
 from limit_surface_ros.decay.rates_neutral import neutral_rates
 from limit_surface_ros.decay.rates_polished import polished_rates
 from limit_surface_ros.decay.response_fits import ResponseFit, fit_response
+from limit_surface_ros.decay.smoothing import is_noisy
 from limit_surface_ros.errors import LimitSurfaceError, RangeError, SolverError
 
 if TYPE_CHECKING:
@@ -76,7 +77,7 @@ def fit_decay(
         method: How rates are chosen: "dde" (characteristic roots of the response's own delay
             system, the thesis), "neutral" (closed-form roots), "esprit" (from samples),
             "polished" (ESPRIT's rates, then moved to reduce the error), or "best" (the best of
-            neutral and esprit, polished).
+            neutral and esprit, polished unless the record is noisy).
         norm: In which norm the coefficients are fitted, see `coefficient_fits`. Rates are always
             chosen by the infinity norm.
         options: Choices for single methods.
@@ -125,14 +126,19 @@ def _choose(
 def _best(
     response: Target, terms: int, end: float, options: Options, tell: Progress
 ) -> RateChoice:
-    """Polish each closed or sampled choice and keep the best; none of them can spoil it."""
+    """Polish each closed or sampled choice and keep the best; none of them can spoil it.
+
+    The largest error of a noisy record is its worst outlier, which polishing would chase.
+    """
+    noisy = is_noisy(response)
     choices: list[RateChoice] = []
     failure: LimitSurfaceError | None = None
     for method in ("esprit", "neutral"):
         try:
             choice = _choose(response, terms, end, method, options, tell)
             choices.append(choice)
-            choices.append(_polish(response, end, choice, tell))
+            if not noisy:
+                choices.append(_polish(response, end, choice, tell))
         except LimitSurfaceError as error:
             failure = error
             tell(f"{method}: {error}")

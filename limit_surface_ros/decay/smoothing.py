@@ -25,14 +25,23 @@ CELLS_TO_SETTLE, MOST_CELLS = 4, 36
 def noise_level(response: Target) -> float:
     """Return the standard deviation of a record's noise, in the unit of x; 0 if it has none.
 
-    Taken from the median of second differences, in which a smooth or piecewise linear response
-    leaves next to nothing.
+    Taken from the median distance of a sample from the line through its neighbours, in which a
+    smooth or piecewise linear response leaves next to nothing.
     """
     if not isinstance(response, PiecewiseLinear) or len(response.knots) < LEAST_SAMPLES:
         return 0.0
-    bends = np.diff(response.values, 2)
-    # 1.4826 turns a median into a deviation, and a second difference has variance 6.
-    return float(1.4826 * np.median(np.abs(bends)) / np.sqrt(6.0))
+    times, values = response.knots, response.values
+    share = (times[1:-1] - times[:-2]) / (times[2:] - times[:-2])
+    distances = values[1:-1] - (1.0 - share) * values[:-2] - share * values[2:]
+    # For independent noise of deviation 1 each distance has the deviation below, and 1.4826
+    # turns the median of absolute values into a deviation.
+    deviations = np.sqrt(1.0 + share**2 + (1.0 - share) ** 2)
+    return float(1.4826 * np.median(np.abs(distances / deviations)))
+
+
+def is_noisy(response: Target) -> bool:
+    """Tell whether a record's noise is more than its kernel or a polished fit could stand."""
+    return noise_level(response) > TOLERATED * abs(float(response(0.0)))
 
 
 def settling_time(response: Target, end: float) -> float:
@@ -46,10 +55,8 @@ def settling_time(response: Target, end: float) -> float:
 
 def smoothed(response: Target, end: float) -> Target:
     """Return a noisy record on [0, end] as a linear spline of few cells; others as they are."""
-    noise = noise_level(response)
-    if noise <= TOLERATED * abs(float(response(0.0))):
+    if not isinstance(response, PiecewiseLinear) or not is_noisy(response):
         return response
-    assert isinstance(response, PiecewiseLinear)
     cell = max(settling_time(response, end) / CELLS_TO_SETTLE, end / MOST_CELLS)
     knots = np.linspace(0.0, end, max(2, round(end / cell) + 1))
     times = response.knots[response.knots <= end]

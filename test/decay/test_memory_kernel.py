@@ -10,6 +10,7 @@ from limit_surface_ros.decay.closed_kernel import ClosedKernel
 from limit_surface_ros.decay.construction import delay_system, system_of_kernel
 from limit_surface_ros.decay.impulses import find_impulses
 from limit_surface_ros.decay.kernel import divide_series, memory_kernel
+from limit_surface_ros.decay.smoothing import noise_level, smoothed
 from limit_surface_ros.decay.targets import Analytic, PiecewiseLinear, uniform_times
 from limit_surface_ros.errors import DataError, NotFiniteError, RangeError, ShapeError
 
@@ -114,6 +115,29 @@ def test_an_exact_kernel_leaves_the_characteristic_function_x0_over_transform():
     s = np.array([0.5, 1.0 + 2.0j, 0.2 + 7.0j])
     transform = (s - 1.0 + np.exp(-s)) / s**2
     np.testing.assert_allclose(system.characteristic(s) * transform, 1.0, atol=1e-5)
+
+
+def test_the_printed_polynomials_miss_the_kernel_by_what_their_rounding_costs():
+    kernel = ClosedKernel(examples.hockey_stick(), 6.0)
+    printed = examples.printed_system().pieces
+    worst = [
+        np.abs(printed(t) - kernel(t)).max()
+        for t in (cell + np.linspace(0.01, 0.99, 99) for cell in range(6))
+    ]
+    np.testing.assert_array_less(worst, [0.013, 0.013, 0.013, 0.013, 0.2, 0.8])
+    assert worst[5] > 0.5
+
+
+def test_noise_is_told_from_shape():
+    times = np.sort(np.random.default_rng(0).uniform(0.0, 6.0, 600))
+    times[0] = 0.0
+    clean = examples.hockey_stick()(times)
+    noise = 0.01 * np.random.default_rng(1).normal(size=600)
+    assert noise_level(PiecewiseLinear(times, clean)) < 1e-12
+    assert noise_level(PiecewiseLinear(times, clean + noise)) == pytest.approx(0.01, rel=0.15)
+    quiet = smoothed(PiecewiseLinear(times, clean + noise), 6.0)
+    assert len(quiet.knots) <= 37
+    assert np.abs(quiet(times) - clean).max() < 0.06
 
 
 def test_kinks_can_be_put_on_the_grid():
