@@ -57,8 +57,6 @@ def fit_power_sum(
         raise RangeError(f"velocity_weight must not be negative, got {weight}")
     scaled = scale_pairs(pairs, scaling)
     check_support(scaled, PARAMETERS_PER_MATRIX * powers.size)
-    objective = PowerSumObjective(
-        scaled.wrenches, scaled.directions, powers, weight, scaled.scaling
-    )
+    objective = PowerSumObjective(scaled, powers, weight)
     name = "J1" if weight == 0.0 else f"J2, velocity weight {weight:g}"
     return solve(objective, name, pairs, search or Search())

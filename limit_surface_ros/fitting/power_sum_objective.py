@@ -1,12 +1,13 @@
 """J1 and J2 of a power sum, with their gradient by matrix calculus (thesis 3.5 to 3.10).
 
-    J = sum_k (H(f_k) - 1)^2 + w |v_k - v^(f_k)|^2,   H(f) = sum_i (f' A_i f)^(p_i)
+    J = sum_k m_k ((H(f_k) - 1)^2 + w rho(|v_k - v^(f_k)|)),   H(f) = sum_i (f' A_i f)^(p_i)
 
-where v^ is the unit gradient of H and w the velocity weight: J1 has w = 0, the thesis's J2 w = 1.
-With q_i = f' A_i f, c_i = 2 p_i q_i^(p_i - 1), the gradient of H is g = sum_i c_i A_i f. Let
-s = dJ/dg = 2 w ((v . v^) v^ - v) / |g|; then
+where v^ is the unit gradient of H, w the velocity weight and m_k the pair's own, 1 unless given.
+rho is the square (see `direction_loss`): then w = 0 is J1 of the thesis and w = 1 its J2. With
+q_i = f' A_i f, c_i = 2 p_i q_i^(p_i - 1), the gradient of H is g = sum_i c_i A_i f. Let s = dJ/dg,
+which is along v - (v . v^) v^; then
 
-    dJ/dA_i = sum_k a_ik f f' + c_ik s f',   a_ik = c_ik ((H - 1) + (p_i - 1) (s' A_i f) / q_i)
+    dJ/dA_i = sum_k a_ik f f' + c_ik s f',   a_ik = c_ik (m (H - 1) + (p_i - 1) (s' A_i f) / q_i)
 
 so that the gradient of all terms is one matrix product over the pairs, about twice the work of
 the cost alone.
@@ -25,11 +26,12 @@ from limit_surface_ros.fitting.cholesky import (
     parameter_gradient,
     parameters_of,
 )
+from limit_surface_ros.fitting.direction_loss import direction_loss
 from limit_surface_ros.surface.power_sum import PowerSum
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.scaling import Scaling
+    from limit_surface_ros.fitting.scaled_pairs import ScaledPairs
 
 # Keeps powers and logarithms of a quadratic form finite where a matrix has lost the load's
 # direction; in scaled variables it is far below anything that a fit can see.
@@ -37,37 +39,35 @@ _TINY = 1e-100
 
 
 class PowerSumObjective:
-    """J1 or J2 of a power sum over scaled pairs.
-
-    Attributes:
-        exponents: Shape (m,), the powers p_i.
-        velocity_weight: w; 0 gives J1.
-    """
+    """J1 or J2 of a power sum over scaled pairs."""
 
     def __init__(
         self,
-        wrenches: Floats,
-        directions: Floats,
+        pairs: ScaledPairs,
         exponents: Floats,
         velocity_weight: float,
-        scaling: Scaling,
+        robust_scale: float | None = None,
     ) -> None:
         """Hold the pairs, one column each, and the work arrays.
 
         Args:
-            wrenches: Shape (n, 3), scaled.
-            directions: Shape (n, 3), scaled unit twists.
-            exponents: Shape (m,).
-            velocity_weight: w >= 0.
-            scaling: What the surface's physical units are.
+            pairs: What to fit.
+            exponents: p_i, shape (m,).
+            velocity_weight: w; 0 gives J1.
+            robust_scale: See `direction_loss`.
         """
-        self.exponents = exponents
-        self.velocity_weight = velocity_weight
-        self._scaling = scaling
-        self._loads = np.ascontiguousarray(wrenches.T)
-        self._directions = np.ascontiguousarray(directions.T)
-        terms, pairs = exponents.size, len(wrenches)
+        self._arguments = (pairs, exponents, velocity_weight, robust_scale)
+        self._exponents = exponents
+        self._velocity_weight = velocity_weight
+        self._robust_scale = robust_scale
+        self._scaling = pairs.scaling
+        self._weights = pairs.weights
+        self._loads = np.ascontiguousarray(pairs.wrenches.T)
+        self._directions = np.ascontiguousarray(pairs.directions.T)
         self._powers = exponents[:, None]
+        self._allocate(exponents.size, len(pairs))
+
+    def _allocate(self, terms: int, pairs: int) -> None:
         # A step allocates nothing of the pairs' size: memory that goes back to the system at
         # each step costs three times the arithmetic.
         self._products = np.empty((terms, 3, pairs))
@@ -80,36 +80,38 @@ class PowerSumObjective:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel to other processes without the work arrays."""
-        data = (self._loads.T, self._directions.T, self.exponents)
-        return type(self), (*data, self.velocity_weight, self._scaling)
+        return type(self), self._arguments
 
     @property
     def size(self) -> int:
         """Number of parameters: six for each term."""
-        return PARAMETERS_PER_MATRIX * self.exponents.size
+        return PARAMETERS_PER_MATRIX * self._exponents.size
 
     def cost(self, parameters: Floats) -> float:
         """Return the cost alone."""
         matrices = matrices_of(factors_of(parameters))
         residual = self._evaluate(matrices)
-        cost = float(residual @ residual)
-        if self.velocity_weight > 0.0:
-            cost += self._velocity_cost(self._normalise()[1])
-        return cost
+        cost = self._weights @ residual**2
+        if self._velocity_weight > 0.0:
+            loss, _ = direction_loss(self._normalise()[1], self._robust_scale)
+            cost += self._velocity_weight * (self._weights @ loss)
+        return float(cost)
 
     def cost_and_gradient(self, parameters: Floats) -> tuple[float, Floats]:
         """Return the cost and its gradient, shape (6 m,)."""
         factors = factors_of(parameters)
         residual = self._evaluate(matrices_of(factors))
-        cost = float(residual @ residual)
+        cost = self._weights @ residual**2
+        residual *= self._weights
         loads, bends, slopes = self._loads, self._bends, self._slopes
-        if self.velocity_weight > 0.0:
+        if self._velocity_weight > 0.0:
             norms, cosines = self._normalise()
-            cost += self._velocity_cost(cosines)
+            loss, slope = direction_loss(cosines, self._robust_scale)
+            cost += self._velocity_weight * (self._weights @ loss)
             pull = self._normals
-            pull *= cosines
-            pull -= self._directions
-            pull *= 2.0 * self.velocity_weight / norms
+            pull *= -cosines
+            pull += self._directions
+            pull *= slope * (self._velocity_weight * self._weights / norms)
             np.einsum("mcn,cn->mn", self._products, pull, out=bends)
             bends *= self._powers - 1.0
             bends /= self._forms
@@ -122,25 +124,25 @@ class PowerSumObjective:
             np.multiply(slopes, residual, out=bends)
             weighted = np.multiply(bends[:, None], loads, out=self._weighted)
         gradient = weighted.reshape(-1, loads.shape[1]) @ loads.T
-        return cost, parameter_gradient(gradient.reshape(-1, 3, 3), factors)
+        return float(cost), parameter_gradient(gradient.reshape(-1, 3, 3), factors)
 
     def start(self, rng: np.random.Generator) -> Floats:
         """Return random factors, whitened by the loads, with every term 1/m on average."""
         spread = self._loads @ self._loads.T / self._loads.shape[1]
         spread += 1e-9 * np.trace(spread) * np.eye(3)
         whitener = np.linalg.inv(np.linalg.cholesky(spread)).T
-        factors = np.tril(rng.normal(size=(self.exponents.size, 3, 3)))
+        factors = np.tril(rng.normal(size=(self._exponents.size, 3, 3)))
         matrices = whitener @ matrices_of(factors) @ whitener.T
         factors = np.linalg.cholesky(
             matrices + 1e-9 * np.trace(matrices, axis1=1, axis2=2)[:, None, None] * np.eye(3)
         )
         self._evaluate(matrices_of(factors))
-        scale: Floats = self._values.mean(axis=1) * self.exponents.size
-        return parameters_of(factors * (scale ** (-0.5 / self.exponents))[:, None, None])
+        scale: Floats = self._values.mean(axis=1) * self._exponents.size
+        return parameters_of(factors * (scale ** (-0.5 / self._exponents))[:, None, None])
 
     def surface(self, parameters: Floats) -> PowerSum:
         """Return the power sum of `parameters`."""
-        return PowerSum(matrices_of(factors_of(parameters)), self.exponents, self._scaling)
+        return PowerSum(matrices_of(factors_of(parameters)), self._exponents, self._scaling)
 
     def _evaluate(self, matrices: Floats) -> Floats:
         """Fill products A_i f, forms q_i, values q_i^p_i and slopes c_i; return H - 1."""
@@ -163,7 +165,3 @@ class PowerSumObjective:
         np.maximum(norms, _TINY, out=norms)
         normals /= norms
         return norms, np.einsum("cn,cn->n", normals, self._directions)
-
-    def _velocity_cost(self, cosines: Floats) -> float:
-        """Return w sum |v - v^|^2 = 2 w sum (1 - v . v^)."""
-        return 2.0 * self.velocity_weight * float(cosines.size - cosines.sum())

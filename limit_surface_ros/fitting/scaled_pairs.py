@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,11 +29,31 @@ class ScaledPairs:
         wrenches: Shape (n, 3).
         directions: Unit twists, shape (n, 3).
         scaling: What they were scaled with.
+        weights: How much each pair counts, shape (n,); 1 each if not given.
     """
 
     wrenches: Floats
     directions: Floats
     scaling: Scaling
+    weights: Floats = field(default_factory=lambda: np.empty(0))
+
+    def __post_init__(self) -> None:
+        """Fill in weights of 1."""
+        if not self.weights.size:
+            object.__setattr__(self, "weights", np.ones(len(self.wrenches)))
+
+    def weighted(self, weights: Floats) -> ScaledPairs:
+        """Return the same pairs with their weights multiplied by `weights`, shape (n,)."""
+        return replace(self, weights=self.weights * weights)
+
+    def joined(self, other: ScaledPairs) -> ScaledPairs:
+        """Return these pairs and then those of `other`, which has the same scaling."""
+        return ScaledPairs(
+            np.concatenate([self.wrenches, other.wrenches]),
+            np.concatenate([self.directions, other.directions]),
+            self.scaling,
+            np.concatenate([self.weights, other.weights]),
+        )
 
     def __len__(self) -> int:
         """Return the number of pairs."""

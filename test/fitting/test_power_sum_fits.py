@@ -37,12 +37,12 @@ def triangle_pairs(motions: int, per_facet: int, seed: int = 0) -> Pairs:
     seed=st.integers(0, 2**32 - 1),
     exponents=st.lists(st.floats(0.1, 1.0), min_size=1, max_size=4),
     weight=st.sampled_from([0.0, 0.3, 1.0, 20.0]),
+    robust=st.sampled_from([None, 0.1, 1.0]),
 )
-def test_gradient_agrees_with_finite_differences(seed, exponents, weight):
+def test_gradient_agrees_with_finite_differences(seed, exponents, weight, robust):
     pairs = scale_pairs(triangle_pairs(40, 3), SCALING)
-    objective = PowerSumObjective(
-        pairs.wrenches, pairs.directions, np.array(exponents), weight, SCALING
-    )
+    pairs = pairs.weighted(np.random.default_rng(seed).exponential(size=len(pairs)))
+    objective = PowerSumObjective(pairs, np.array(exponents), weight, robust)
     start = objective.start(np.random.default_rng(seed))
     cost, gradient = objective.cost_and_gradient(start)
     assert cost == pytest.approx(objective.cost(start), rel=1e-12)
