@@ -41,7 +41,8 @@ def allowed(layer: str) -> set[str]:
     if layer == "":
         return {""}
     if layer in TOPS:
-        return {"", *LAYERS, layer}
+        # Programs that make pictures are tools, and need plots.
+        return {"", *LAYERS, layer, *(["plots"] if layer == "tools" else [])}
     return {"", *LAYERS[: LAYERS.index(layer) + 1]}
 
 
