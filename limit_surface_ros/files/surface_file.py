@@ -3,7 +3,8 @@
 Keys: `schema: 1`, `name`, `kind`, `frame_id`, `reference_point` [m], `characteristic_length` [m],
 `friction_force` [N], `normal_force` [N] (optional), `fit` (how the model came about; free), and
 last the numbers that define the kind: `terms`, `exponents` and `matrices` of a power_sum, `terms`
-and `matrices` of a dissipation, `points` [m] and `friction_limits` [N] of point_contacts. Because
+and `matrices` of a dissipation, `points` [m] and `friction_limits` [N] of point_contacts,
+`coefficients` of a polynomial in the order of `surface.polynomial.MONOMIALS`. Because
 these come last and are counted, a file cut short anywhere is refused.
 """
 
@@ -18,6 +19,7 @@ from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.yaml_reader import Section, place_errors, read_yaml, write_yaml
 from limit_surface_ros.surface.dissipation import Dissipation
 from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.polynomial import Polynomial
 from limit_surface_ros.surface.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 
@@ -82,16 +84,22 @@ def _read_point_contacts(section: Section, scaling: Scaling) -> LimitSurface:
     return PointContacts(points, section.array("friction_limits", (len(points),)), scaling)
 
 
+def _read_polynomial(section: Section, scaling: Scaling) -> LimitSurface:
+    return Polynomial(section.array("coefficients", (15,)), scaling)
+
+
 _READERS: dict[str, Callable[[Section, Scaling], LimitSurface]] = {
     "power_sum": _read_power_sum,
     "dissipation": _read_dissipation,
     "point_contacts": _read_point_contacts,
+    "polynomial": _read_polynomial,
 }
 # What defines each kind, in the order of the file.
 _DEFINING = {
     "power_sum": ("exponents", "matrices"),
     "dissipation": ("matrices",),
     "point_contacts": ("points", "friction_limits"),
+    "polynomial": ("coefficients",),
 }
 
 

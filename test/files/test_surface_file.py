@@ -11,6 +11,7 @@ from limit_surface_ros.files.surface_file import (
 )
 from limit_surface_ros.surface.dissipation import Dissipation
 from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.polynomial import Polynomial
 from limit_surface_ros.surface.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 
@@ -28,6 +29,7 @@ def surfaces():
         PowerSum(random_matrices(3), [1.0, 2 / 3, 1 / 3], scaling),
         Dissipation(random_matrices(2), scaling),
         PointContacts(RNG.normal(size=(3, 2)), [0.5, 0.1, 1 / 3], scaling),
+        Polynomial([1, 0, 0, 1 / 3, 0, 1, 0, 0, 0, 0, 2, 0, 1, 0, 3], scaling),
     ]
 
 

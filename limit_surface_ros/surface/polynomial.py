@@ -1,0 +1,160 @@
+"""Homogeneous polynomials of fourth order: the model of Zhou et al., the peer of the other kinds.
+
+J. Zhou, R. Paolini, J. A. Bagnell and M. T. Mason, "A convex polynomial force-motion model for
+planar sliding", ICRA 2016, doi:10.1109/ICRA.2016.7487155.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from limit_surface_ros.checks import as_floats, as_vectors
+from limit_surface_ros.errors import MatrixError, ShapeError
+from limit_surface_ros.surface.gauge_inverse import (
+    ConvexInverse,
+    FramedInverse,
+    PeakInverse,
+    round_frame,
+)
+from limit_surface_ros.surface.scaled_surface import ScaledSurface
+from limit_surface_ros.surface.scaling import Scaling
+from limit_surface_ros.surface.sphere import even_directions
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.gauge_inverse import Inverse
+
+# Exponents (i, j, k) of fx^i fy^j m^k in the order of the coefficients: x^4, x^3 y, x^3 m,
+# x^2 y^2, x^2 y m, x^2 m^2, x y^3, x y^2 m, x y m^2, x m^3, y^4, y^3 m, y^2 m^2, y m^3, m^4.
+MONOMIALS = np.array([(i, j, 4 - i - j) for i in range(4, -1, -1) for j in range(4 - i, -1, -1)])
+# The same for the second derivatives: x^2, x y, x m, y^2, y m, m^2.
+_QUADRATICS = [(2, 0, 0), (1, 1, 0), (1, 0, 1), (0, 2, 0), (0, 1, 1), (0, 0, 2)]
+_CHECKED_DIRECTIONS = 2000
+_STARTS = 500
+
+
+@dataclass(frozen=True, eq=False)
+class Polynomial(ScaledSurface):
+    """The surface P(f) = 1 of a polynomial that is homogeneous of degree four.
+
+    Attributes:
+        coefficients: In the order of `MONOMIALS`, for scaled loads, shape (15,).
+        scaling: Characteristic length [m] and friction force [N].
+
+    Raises:
+        ShapeError: There are not 15 coefficients.
+        NotFiniteError: A coefficient is NaN or infinite.
+        MatrixError: The polynomial is not positive, so that the surface is not closed.
+    """
+
+    kind: ClassVar[str] = "polynomial"
+
+    coefficients: Floats
+    scaling: Scaling = field(default_factory=Scaling)
+    _second: Floats = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the coefficients and differentiate twice."""
+        coefficients = as_floats("coefficients", self.coefficients).copy()
+        if coefficients.shape != (15,):
+            raise ShapeError(f"coefficients must have shape (15,), got {coefficients.shape}")
+        coefficients.setflags(write=False)
+        object.__setattr__(self, "coefficients", coefficients)
+        object.__setattr__(self, "_second", _second_derivatives(coefficients))
+        directions = even_directions(_CHECKED_DIRECTIONS)
+        values = self.value(directions)
+        if not values.min() > 0.0:
+            raise MatrixError(
+                "the polynomial must be positive: it is "
+                f"{values.min():.6g} at the scaled load {directions[values.argmin()].tolist()}"
+            )
+
+    def with_friction_force(self, friction_force: float) -> Polynomial:
+        """Return the same body under another weight; see `ScaledSurface`."""
+        return replace(self, scaling=replace(self.scaling, friction_force=friction_force))
+
+    def value(self, load: ArrayLike) -> Floats:
+        """Return P at scaled loads (..., 3): below 1 inside the surface, 1 on it; shape (...)."""
+        columns = np.moveaxis(as_vectors("load", load), -1, 0)
+        return np.asarray((self._gradient(columns)[0] * columns).sum(axis=0) / 4.0)[()]
+
+    def gradient(self, load: ArrayLike) -> Floats:
+        """Return the gradient of P at scaled loads (..., 3); shape (..., 3)."""
+        columns = np.moveaxis(as_vectors("load", load), -1, 0)
+        return np.asarray(np.moveaxis(self._gradient(columns)[0], 0, -1))
+
+    def derivatives(self, loads: Floats, _smoothing: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return the gauge P^(1/4) of scaled loads (3, m); see `plane_minimum.Gauge`."""
+        gradient, hessian = self._gradient(loads)
+        value = (gradient * loads).sum(axis=0) / 4.0
+        gauge = value**0.25
+        outer = gradient[:, np.newaxis] * gradient
+        factor = 0.25 * gauge / value
+        return gauge, factor * gradient, factor * (hessian - 0.75 / value * outer)
+
+    def _load_factors(self, loads: Floats) -> Floats:
+        values = (self._gradient(loads)[0] * loads).sum(axis=0) / 4.0
+        return np.asarray(np.sqrt(np.sqrt(values)))
+
+    def _twists(self, loads: Floats) -> Floats:
+        gradient = self._gradient(loads)[0]
+        return np.asarray(gradient / np.sqrt((gradient * gradient).sum(axis=0)))
+
+    def _loads(self, twists: Floats) -> Floats:
+        return self._inverse.solve(twists)[0]
+
+    @cached_property
+    def _inverse(self) -> Inverse:
+        frame = round_frame(self)
+        round_surface = _Framed(self, frame)
+        directions = even_directions(2 * _STARTS).T
+        curvatures = np.linalg.eigvalsh(
+            np.moveaxis(round_surface.derivatives(directions, np.zeros(2 * _STARTS))[2], -1, 0)
+        )
+        # The gauge is flat along the ray; any curvature below that bends inward.
+        if curvatures[:, 0].min() > -1e-9 * curvatures[:, -1].max():
+            return FramedInverse(frame, ConvexInverse(round_surface, directions))
+        return FramedInverse(frame, PeakInverse(round_surface, directions[:, _STARTS:]))
+
+    def _gradient(self, loads: Floats) -> tuple[Floats, Floats]:
+        """Return the gradient (3, ...) and the Hessian (3, 3, ...) at scaled loads (3, ...)."""
+        x, y, m = loads
+        quadratics = np.array([x * x, x * y, x * m, y * y, y * m, m * m])
+        hessian = np.tensordot(self._second, quadratics, axes=1)
+        return np.einsum("ij...,j...->i...", hessian, loads) / 3.0, hessian
+
+
+class _Framed:
+    """The gauge of a polynomial in other axes, f = F y."""
+
+    def __init__(self, polynomial: Polynomial, frame: Floats) -> None:
+        self._polynomial = polynomial
+        self._frame = frame
+
+    def derivatives(self, points: Floats, smoothing: Floats) -> tuple[Floats, Floats, Floats]:
+        gauge, gradient, hessian = self._polynomial.derivatives(self._frame @ points, smoothing)
+        turned = np.einsum("ai,abm,bj->ijm", self._frame, hessian, self._frame)
+        return gauge, self._frame.T @ gradient, turned
+
+
+def _second_derivatives(coefficients: Floats) -> Floats:
+    """Return C (3, 3, 6) with the Hessian C q for the quadratic monomials q."""
+    second: Floats = np.zeros((3, 3, 6))
+    places = {powers: place for place, powers in enumerate(_QUADRATICS)}
+    for coefficient, powers in zip(coefficients, MONOMIALS, strict=True):
+        for i in range(3):
+            for j in range(3):
+                left = powers.copy()
+                factor = coefficient * left[i]
+                left[i] -= 1
+                factor *= left[j]
+                left[j] -= 1
+                if factor != 0.0:
+                    second[i, j, places[left[0], left[1], left[2]]] += factor
+    return second
