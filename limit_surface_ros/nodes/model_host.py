@@ -19,22 +19,26 @@ if TYPE_CHECKING:
 _IN_PACKAGE = "package://"
 
 
-def model_settings(folder: str, noun: str) -> tuple[Setting, ...]:
+def model_settings(
+    folder: str, noun: str, files: str = "model_files", default: str = "default_model"
+) -> tuple[Setting, ...]:
     """Return the settings that say which models are served.
 
     Args:
         folder: Folder of the models that ship with this package.
         noun: What the files hold, for the descriptions.
+        files: Name of the parameter that names the files.
+        default: Name of the parameter that names the default model.
     """
     return (
         Setting(
-            "model_files",
+            files,
             [f"{_IN_PACKAGE}limit_surface_ros/{folder}"],
             f"YAML files of {noun}, or folders whose *.yaml are taken, as paths or "
             "package://NAME/PATH",
         ),
         Setting(
-            "default_model",
+            default,
             "",
             "Name of the model that an empty name in a request and the topics stand for; "
             "empty: the first",
@@ -48,6 +52,12 @@ class ModelHost(Generic[Model]):
     Args:
         parameters: The node's parameters, which include `model_settings`.
         read: Reader of one file.
+        files: Name of the parameter that names the files.
+        default: Name of the parameter that names the default model.
+
+    Attributes:
+        models: The models; replaced as a whole.
+        names: Names of the two parameters.
 
     Raises:
         FileError: A file is absent or not valid, or two models share a name.
@@ -56,24 +66,21 @@ class ModelHost(Generic[Model]):
 
     models: ModelSet[Model]
 
-    def __init__(self, parameters: Parameters, read: Callable[[Path], Model]) -> None:
+    def __init__(
+        self,
+        parameters: Parameters,
+        read: Callable[[Path], Model],
+        files: str = "model_files",
+        default: str = "default_model",
+    ) -> None:
         """Read the models that the parameters name."""
-        self._parameters = parameters
         self._read = read
-        parameters.concern(["model_files", "default_model"], self._prepare)
+        self.names = (files, default)
+        parameters.concern(self.names, self._prepare)
 
     def __getitem__(self, name: str) -> Model:
         """Return a model; an empty name is the default model's."""
         return self.models[name]
-
-    def reload(self) -> str:
-        """Read the files anew and swap the models in; return what is loaded, for people.
-
-        Raises:
-            LimitSurfaceError: A file is not valid; the old models keep serving.
-        """
-        self._prepare(self._parameters)()
-        return self.summary
 
     @property
     def summary(self) -> str:
@@ -82,8 +89,8 @@ class ModelHost(Generic[Model]):
         return f"{len(self.models)} loaded: {names}; default {self.models.default}"
 
     def _prepare(self, values: Values) -> Callable[[], None]:
-        paths = resolved(values["model_files"])
-        models = read_model_set(paths, self._read, values["default_model"])
+        files, default = (values[name] for name in self.names)
+        models = read_model_set(resolved(files), self._read, default)
 
         def apply() -> None:
             self.models = models

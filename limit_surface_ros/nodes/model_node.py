@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import time
 import traceback
-from typing import TYPE_CHECKING, Any, Generic
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
@@ -19,11 +19,13 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from std_srvs.srv import Trigger
 
 from limit_surface_ros.errors import LimitSurfaceError
-from limit_surface_ros.files.model_set import Model
-from limit_surface_ros.nodes import answers, diagnostics, spin
+from limit_surface_ros.files.model_set import Model, Named
+from limit_surface_ros.nodes import answers, spin
+from limit_surface_ros.nodes.diagnostics import Diagnostics
 from limit_surface_ros.nodes.health import Health, InputAge
 from limit_surface_ros.nodes.model_host import ModelHost
 from limit_surface_ros.nodes.parameters import Parameters
+from limit_surface_ros.nodes.settings import Setting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -31,11 +33,22 @@ if TYPE_CHECKING:
 
     from rclpy.publisher import Publisher
 
-    from limit_surface_ros.nodes.settings import Setting
+# Models of a second kind.
+Model2 = TypeVar("Model2", bound=Named)
 
 LOG_PERIOD = 5.0
 DEPTH = 10
-COMMON_SETTINGS = (*diagnostics.SETTINGS, spin.EXECUTOR)
+COMMON_SETTINGS = (
+    Setting(
+        "input_timeout",
+        0.5,
+        "Longest silence of a topic input in node time before it is reported as stale [s]; "
+        "0: never",
+        minimum=0.0,
+        maximum=1e6,
+    ),
+    spin.EXECUTOR,
+)
 
 
 class ModelNode(Node, Generic[Model]):
@@ -69,17 +82,42 @@ class ModelNode(Node, Generic[Model]):
         try:
             self.values = Parameters(self, [*settings, *COMMON_SETTINGS])
             self.models = ModelHost(self.values, read)
+            self._hosts: list[ModelHost[Any]] = [self.models]
         except Exception:
             self.destroy_node()
             raise
         self.health = Health()
         self.create_service(Trigger, "~/reload", self._reload)
-        self._diagnostics = diagnostics.Diagnostics(self, self.values, self.health, self.describe)
+        self._diagnostics = Diagnostics(
+            self, self.health, self.describe, lambda: self.values["input_timeout"]
+        )
         self.get_logger().info(self.models.summary)
 
     def describe(self) -> dict[str, str]:
         """Return what diagnostics say beside counts and times."""
         return {"model": self.models.models.default, "models": str(len(self.models.models))}
+
+    def add_models(
+        self, read: Callable[[Path], Model2], files: str, default: str
+    ) -> ModelHost[Model2]:
+        """Serve models of a second kind, reloaded together with the first.
+
+        Args:
+            read: Reader of one file.
+            files: Name of the parameter that names the files.
+            default: Name of the parameter that names the default model.
+
+        Raises:
+            LimitSurfaceError: A file is not accepted.
+        """
+        try:
+            host = ModelHost(self.values, read, files, default)
+        except Exception:
+            self.destroy_node()
+            raise
+        self._hosts.append(host)
+        self.get_logger().info(host.summary)
+        return host
 
     def add_service(
         self, service_type: Any, name: str, handler: Callable[[Any, Any], None]
@@ -95,39 +133,53 @@ class ModelNode(Node, Generic[Model]):
             service_type, f"~/{name}", functools.partial(self._answer, name, handler)
         )
 
-    def add_input(self, message_type: Any, name: str, handler: Callable[[Any], None]) -> None:
-        """Subscribe to `~/name`, best effort, so that any publisher matches.
+    def add_input(
+        self,
+        message_type: Any,
+        name: str,
+        handler: Callable[[Any], None],
+        *,
+        stream: bool = True,
+    ) -> None:
+        """Subscribe to `~/name`.
 
         Args:
             message_type: Type of the messages.
             name: Name of the topic, without `~/`.
             handler: Takes a message, or raises to drop it.
+            stream: Whether messages come steadily: best effort then, so that any publisher
+                matches, and silence is reported. Otherwise each counts, and none may be lost.
         """
-        self.health.inputs[name] = InputAge()
+        if stream:
+            self.health.inputs[name] = InputAge()
+        reliability = ReliabilityPolicy.BEST_EFFORT if stream else ReliabilityPolicy.RELIABLE
         self.create_subscription(
             message_type,
             f"~/{name}",
             functools.partial(self._take, name, handler),
-            QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT),
+            QoSProfile(depth=DEPTH, reliability=reliability),
             event_callbacks=SubscriptionEventCallbacks(
                 incompatible_qos=functools.partial(self._mismatch, name)
             ),
             qos_overriding_options=QoSOverridingOptions.with_default_policies(),
         )
 
-    def add_output(self, message_type: Any, name: str, *, latched: bool = False) -> Publisher:
+    def add_output(
+        self, message_type: Any, name: str, *, latched: bool = False, depth: int = DEPTH
+    ) -> Publisher:
         """Publish `~/name`, reliable.
 
         Args:
             message_type: Type of the messages.
             name: Name of the topic, without `~/`.
             latched: Whether who subscribes later gets the last message.
+            depth: Number of messages that are kept for slow subscribers; 1 if latched.
         """
         durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
         return self.create_publisher(
             message_type,
             f"~/{name}",
-            QoSProfile(depth=1 if latched else DEPTH, durability=durability),
+            QoSProfile(depth=1 if latched else depth, durability=durability),
             event_callbacks=PublisherEventCallbacks(
                 incompatible_qos=functools.partial(self._mismatch, name)
             ),
@@ -159,7 +211,8 @@ class ModelNode(Node, Generic[Model]):
         try:
             handler(message)
             self.health.accepted[name] += 1
-            self.health.inputs[name].last = self.get_clock().now().nanoseconds
+            if name in self.health.inputs:
+                self.health.inputs[name].last = self.get_clock().now().nanoseconds
         except Exception as error:
             self._refuse(name, error)
         self.health.times.add(time.perf_counter() - start)
@@ -183,7 +236,8 @@ class ModelNode(Node, Generic[Model]):
 
     def _reload(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
-            response.message = self.models.reload()
+            self.values.renew([name for host in self._hosts for name in host.names])
+            response.message = "; ".join(host.summary for host in self._hosts)
             response.success = True
             self.get_logger().info(response.message)
         except Exception as error:

@@ -77,6 +77,23 @@ class Parameters:
         prepare(self._values)()
         self._concerned.append((frozenset(names), prepare))
 
+    def renew(self, names: Collection[str]) -> None:
+        """Have the present values prepared and applied anew, all or none of them.
+
+        Args:
+            names: The parameters; what they name, such as files, may have changed.
+
+        Raises:
+            LimitSurfaceError: One is refused now; nothing is applied.
+        """
+        steps = [
+            prepare(self._values)
+            for concerned, prepare in self._concerned
+            if not concerned.isdisjoint(names)
+        ]
+        for step in steps:
+            step()
+
     def _prepare(self, parameters: list[Parameter]) -> SetParametersResult:
         # Other parts of a node (use_sim_time, QoS overrides) have parameters of their own.
         changed = {p.name: _plain(p.value) for p in parameters if p.name in self._settings}
