@@ -27,6 +27,8 @@ PROGRAMS: dict[str, str] = {
     "reproduce_thesis": "limit_surface_ros.tools.reproduce_thesis",
     "demo": "limit_surface_ros.nodes.demo",
     "limit_surface_node": "limit_surface_ros.nodes.limit_surface_node",
+    "decay_node": "limit_surface_ros.nodes.decay_node",
+    "force_motion_nodes": "limit_surface_ros.nodes.force_motion_nodes",
 }
 
 

@@ -65,6 +65,11 @@ class Response:
         return self._estimator.accepted
 
     @property
+    def outliers(self) -> int:
+        """Number of measurements that were refused for being too far from their prediction."""
+        return self._estimator.outliers
+
+    @property
     def residual(self) -> float:
         """Last measured fraction minus its prediction; NaN before the first."""
         return self._estimator.residual / self.start

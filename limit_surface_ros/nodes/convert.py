@@ -8,13 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.errors import (
-    LimitSurfaceError,
-    NotFiniteError,
-    RangeError,
-    ShapeError,
-    ZeroVectorError,
-)
+from limit_surface_ros.errors import NotFiniteError, RangeError, ShapeError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -79,9 +73,8 @@ def rows_of(name: str, numbers: array[float]) -> Floats:
 
     Raises:
         ShapeError: The length is no multiple of three.
-        NotFiniteError: A number is NaN or infinite.
-        RangeError: A row is beyond `LARGEST` or below `SMALLEST` in size.
-        ZeroVectorError: A row is zero; all these errors name the first bad row.
+        NotFiniteError: A number is NaN or infinite; the error names the first such row.
+        RangeError: A number is larger than `LARGEST`; the error names the first such row.
     """
     flat = np.frombuffer(numbers, dtype=np.float64) if len(numbers) else np.empty(0)
     if flat.size % 3:
@@ -89,22 +82,14 @@ def rows_of(name: str, numbers: array[float]) -> Floats:
             f"{name} must hold 3 numbers a row, row after row; {flat.size} is no multiple of 3"
         )
     rows = flat.reshape(-1, 3)
-    sizes = np.abs(rows).max(axis=1)
-    # NaN fails both comparisons.
-    fits = (sizes >= SMALLEST) & (sizes <= LARGEST)
+    fits = np.abs(rows) <= LARGEST
     if not fits.all():
-        row = int(np.argmin(fits))
-        raise _bad_row(f"{name} row {row}", rows[row].tolist())
+        row, column = (int(i) for i in np.argwhere(~fits)[0])
+        value = rows[row, column]
+        if np.isfinite(value):
+            raise RangeError(f"{name} row {row} must be at most {LARGEST:g}, got {value:g}")
+        raise NotFiniteError(f"{name} row {row} must be finite, got {rows[row].tolist()}")
     return rows
-
-
-def _bad_row(where: str, row: list[float]) -> LimitSurfaceError:
-    """Return what is wrong with a row."""
-    if not np.isfinite(row).all():
-        return NotFiniteError(f"{where} must be finite, got {row}")
-    if not any(row):
-        return ZeroVectorError(f"{where} must not be zero: it has no direction")
-    return RangeError(f"{where} must be within {SMALLEST:g} and {LARGEST:g} in size, got {row}")
 
 
 def flat_of(values: Floats) -> array[float]:

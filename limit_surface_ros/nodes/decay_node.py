@@ -1,0 +1,262 @@
+"""The `decay` node: how a load dies away after its onset, and when sliding stops."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from geometry_msgs.msg import Vector3Stamped, WrenchStamped
+from limit_surface_interfaces.msg import DecayForecast
+from limit_surface_interfaces.srv import EvaluateDecay, PredictStop, TimeToLevel
+
+from limit_surface_ros.decay.estimation import EstimationOptions
+from limit_surface_ros.decay.stopping import onset_value, predict_stop
+from limit_surface_ros.errors import RangeError
+from limit_surface_ros.files.decay_file import DecayModel, read_decay_model
+from limit_surface_ros.files.surface_file import read_surface_model
+from limit_surface_ros.nodes import convert, frames, planar_inputs, spin
+from limit_surface_ros.nodes.model_host import model_settings
+from limit_surface_ros.nodes.model_node import ModelNode
+from limit_surface_ros.nodes.onset import Onset
+from limit_surface_ros.nodes.onset_stream import OnsetStream
+from limit_surface_ros.nodes.planar_inputs import PlanarInputs
+from limit_surface_ros.nodes.settings import Setting
+from limit_surface_ros.nodes.stamps import SECOND, nanoseconds
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+NAME = "decay"
+# A measurement stamped later than this is no clock a little ahead but a wrong stamp [ns].
+LATEST_AHEAD = SECOND
+SETTINGS = (
+    *model_settings("config/decay", "decay models"),
+    *model_settings(
+        "config/models", "limit surfaces for predict_stop", "surface_files", "default_surface"
+    ),
+    Setting("rate", 100.0, "Wrenches and values a second [Hz]", minimum=1e-3, maximum=1e4),
+    Setting("horizon", 10.0, "How far forecasts reach [s]", minimum=1e-6, maximum=1e6),
+    Setting("forecast_points", 201, "Number of times in a forecast", minimum=2, maximum=100_000),
+    Setting(
+        "forecast_period",
+        0.1,
+        "Shortest time from one corrected forecast to the next [s]",
+        minimum=0.0,
+        maximum=1e6,
+    ),
+    Setting(
+        "stop_below",
+        0.01,
+        "Publishing ends when no more than this fraction of the onset is left for good",
+        minimum=1e-12,
+        maximum=1.0,
+    ),
+    Setting(
+        "measurement_noise",
+        0.01,
+        "Standard deviation of a measurement, as a fraction of the onset",
+        minimum=1e-9,
+        maximum=1e3,
+    ),
+    Setting(
+        "forgetting",
+        0.999,
+        "Weight of a measurement relative to the one after it; 1: none is forgotten",
+        minimum=1e-3,
+        maximum=1.0,
+    ),
+    Setting(
+        "outlier_gate",
+        5.0,
+        "A measurement further from its prediction than so many standard deviations is an outlier",
+        minimum=1e-3,
+        maximum=1e9,
+    ),
+    Setting(
+        "torque_length",
+        0.1,
+        "Length by which torques are divided to be weighed against forces in measurements [m]",
+        minimum=1e-9,
+        maximum=1e9,
+    ),
+    *frames.SETTINGS,
+    *planar_inputs.SETTINGS,
+)
+
+
+class DecayNode(ModelNode[DecayModel]):
+    """Publishes how an onset dies away, corrects it by measurements, predicts when sliding stops.
+
+    Args:
+        options: Passed on to `rclpy.node.Node`.
+
+    Raises:
+        LimitSurfaceError: A parameter or a model file is not accepted.
+        ParameterException: A parameter has the wrong type or lies outside its range.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        """Read the models and start serving."""
+        super().__init__(NAME, SETTINGS, read_decay_model, **options)
+        self._surfaces = self.add_models(read_surface_model, "surface_files", "default_surface")
+        self._frames = frames.Frames(self, self.values)
+        self._inputs = PlanarInputs(self.values, self._frames, self.report)
+        self._onset: Onset | None = None
+        self._forecast_time = 0
+        self._forecast_samples = 0
+        self._forecasts = self.add_output(DecayForecast, "forecast", latched=True)
+        self._stream = OnsetStream(
+            self,
+            self.add_output(WrenchStamped, "wrench", depth=100),
+            self.add_output(Vector3Stamped, "value", depth=100),
+            self._correct_forecast,
+            self._forget_measurements,
+        )
+        self.values.concern(["rate", "stop_below"], self._prepare_stream)
+        self.add_input(WrenchStamped, "onset", self._begin, stream=False)
+        self.add_input(WrenchStamped, "measurement", self._measure)
+        self.add_service(EvaluateDecay, "evaluate", self._evaluate)
+        self.add_service(TimeToLevel, "time_to_level", self._time_to_level)
+        self.add_service(PredictStop, "predict_stop", self._predict_stop)
+
+    def describe(self) -> dict[str, str]:
+        """Return what diagnostics say beside counts and times."""
+        told = super().describe() | {"surface": self._surfaces.models.default}
+        onset = self._onset
+        if onset is None:
+            return told | {"onset": "none yet"}
+        response = onset.response
+        told |= {
+            "onset": f"{'running' if self._stream.running else 'over'}, model {onset.model.name}",
+            "measurements": str(response.samples),
+            "outliers": str(response.outliers),
+        }
+        if response.samples:
+            told["residual"] = f"{response.residual:.3g} of the onset"
+            told["off_axis"] = f"{onset.off_axis:.3g} of the onset"
+        return told
+
+    def _begin(self, message: WrenchStamped) -> None:
+        options = EstimationOptions(
+            noise=self.values["measurement_noise"],
+            forgetting=self.values["forgetting"],
+            gate=self.values["outlier_gate"],
+        )
+        onset = Onset(message, self.models[""], self._now(), options, self.values["torque_length"])
+        self._onset = onset
+        self._publish_forecast()
+        self._start_stream()
+
+    def _measure(self, message: WrenchStamped) -> None:
+        load = np.array(convert.wrench_components(message.wrench))
+        onset = self._onset
+        if onset is None or not self._stream.running:
+            return
+        now = self._now()
+        stamp = nanoseconds(message.header.stamp) or now
+        if stamp > now + LATEST_AHEAD:
+            raise RangeError(
+                f"a measurement's stamp lies {(stamp - now) * 1e-9:.3g} s in the future"
+            )
+        if stamp < onset.start:
+            return
+        transform = self._frames.to_model(onset.message.header.frame_id, message.header)
+        if transform is not None:
+            load = transform.wrench(load)
+        if not onset.response.learn((stamp - onset.start) * 1e-9, onset.fraction(load)):
+            self.report(
+                "outlier",
+                f"a measurement is {onset.response.residual:.3g} of the onset off its prediction "
+                "and counts for nothing",
+            )
+        self._correct_forecast(now)
+
+    def _correct_forecast(self, now: int) -> None:
+        """Publish what has been learnt since the last forecast, but not too often."""
+        if (now - self._forecast_time) * 1e-9 < self.values["forecast_period"]:
+            return
+        if self._onset.response.samples != self._forecast_samples:
+            self._publish_forecast()
+            self._stream.end_at(self._end())
+
+    def _forget_measurements(self) -> None:
+        """What was measured later than it is now has not happened yet."""
+        response = self._onset.response
+        corrected = response.samples > 0
+        response.forget()
+        if corrected:
+            self._publish_forecast()
+            self._stream.end_at(self._end())
+
+    def _publish_forecast(self) -> None:
+        onset, response = self._onset, self._onset.response
+        times = np.linspace(0.0, self.values["horizon"], self.values["forecast_points"])
+        span = onset.model.time_span
+        self._forecasts.publish(
+            DecayForecast(
+                header=onset.message.header,
+                model=onset.model.name,
+                onset=onset.message.wrench,
+                onset_value=response.start,
+                times=convert.flat_of(times),
+                values=convert.flat_of(response.x(times)),
+                bounds=convert.flat_of(response.bounds(times)),
+                bound_from=span[0],
+                bound_until=span[1],
+                end_time=self._end(),
+                samples=response.samples,
+            )
+        )
+        self._forecast_time, self._forecast_samples = self._now(), response.samples
+
+    def _end(self) -> float:
+        return self._onset.response.time_to_fraction(self.values["stop_below"])
+
+    def _start_stream(self) -> None:
+        if self._onset is not None:
+            self._stream.start(self._onset, self.values["rate"], self._end())
+
+    def _prepare_stream(self, values: Mapping[str, Any]) -> Callable[[], None]:
+        return self._start_stream
+
+    def _evaluate(self, request: EvaluateDecay.Request, response: EvaluateDecay.Response) -> None:
+        model = self.models[request.model]
+        response.values = convert.flat_of(model.sum(np.asarray(request.times)))
+        response.bound = model.max_error
+        response.bound_from, response.bound_until = model.time_span
+
+    def _time_to_level(self, request: TimeToLevel.Request, response: TimeToLevel.Response) -> None:
+        response.time = self.models[request.model].sum.time_to_level(request.level)
+        response.reached = bool(np.isfinite(response.time))
+
+    def _predict_stop(self, request: PredictStop.Request, response: PredictStop.Response) -> None:
+        model, body = self.models[request.model], self._surfaces[request.surface]
+        load = self._inputs.wrench(body, request.wrench)
+        factor = float(load.surface.load_factor(load.vector))
+        stop = predict_stop(model.sum, factor, model.max_error)
+        times = np.linspace(
+            0.0, max(self.values["horizon"], stop.time), self.values["forecast_points"]
+        )
+        response.slides = stop.slides
+        response.load_factor = factor
+        response.stop_time = stop.time
+        response.earliest_stop_time = stop.earliest
+        response.latest_stop_time = stop.latest
+        convert.fill_twist(response.twist.twist, load.surface.twist_of_wrench(load.vector))
+        response.twist.header.stamp = request.wrench.header.stamp
+        response.twist.header.frame_id = body.frame_id
+        response.times = convert.flat_of(times)
+        response.load_factors = convert.flat_of(factor * model.sum(times) / onset_value(model.sum))
+
+    def _now(self) -> int:
+        return int(self.get_clock().now().nanoseconds)
+
+
+def main() -> int:
+    """Run the node until SIGINT or SIGTERM; return the exit code."""
+    return spin.run(lambda: [DecayNode()], __doc__, sys.argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
