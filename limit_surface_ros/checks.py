@@ -6,7 +6,7 @@ Comparisons are written so that NaN fails them.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
     Floats: TypeAlias = NDArray[np.float64]
     Bools: TypeAlias = NDArray[np.bool_]
+
+_REAL = (float, int)
+_INFINITY = float("inf")
 
 
 def as_floats(name: str, values: ArrayLike) -> Floats:
@@ -58,6 +61,23 @@ def as_vectors(name: str, values: ArrayLike) -> Floats:
     return array
 
 
+def one_direction(values: Any) -> tuple[float, float, float] | None:
+    """Return a single, plainly valid vector as three floats, None for anything else.
+
+    The quick way in for callers with one vector: what it does not take, `as_directions` judges.
+    """
+    if type(values) is np.ndarray:
+        if values.shape != (3,):
+            return None
+        values = values.tolist()
+    elif type(values) not in (list, tuple) or len(values) != 3:
+        return None
+    x, y, z = values
+    if not (type(x) in _REAL and type(y) in _REAL and type(z) in _REAL):
+        return None
+    return (x, y, z) if 0.0 < abs(x) + abs(y) + abs(z) < _INFINITY else None
+
+
 def as_directions(name: str, values: ArrayLike) -> Floats:
     """Return `values` as `as_vectors` does, and refuse vectors that are zero.
 
@@ -67,7 +87,8 @@ def as_directions(name: str, values: ArrayLike) -> Floats:
         ZeroVectorError: A vector is zero; the error gives the first one's place.
     """
     array = as_vectors(name, values)
-    zero = ~array.any(axis=-1)
+    # Most often no component is zero, which is quicker to see than that no vector is.
+    zero = np.zeros(0, dtype=bool) if array.all() else ~array.any(axis=-1)
     if zero.any():
         place = tuple(int(i) for i in np.argwhere(zero)[0])
         where = f" at index {place}" if place else ""

@@ -10,6 +10,7 @@ import numpy as np
 
 from limit_surface_ros.surface.dissipation_terms import FormTerms
 from limit_surface_ros.surface.gauge_inverse import ConvexInverse
+from limit_surface_ros.surface.one_load import norm_gradient_of_one, one_load_terms
 from limit_surface_ros.surface.quadratic_form import root_of
 from limit_surface_ros.surface.scaled_surface import ScaledSurface
 from limit_surface_ros.surface.sphere import even_directions
@@ -17,11 +18,14 @@ from limit_surface_ros.surface.sphere import even_directions
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.surface.dissipation_terms import DissipationTerms
+    from limit_surface_ros.surface.one_load import Term, Vector
 
 # Twists that the inverse may start from.
 _STARTS = 400
 # Part of a load along a motion that nothing resists, above which the load causes that motion.
 _FREE = 1e-12
+# Terms up to which plain floats are quicker than numpy for one twist.
+_FEW = 30
 # Relative eigenvalue below which a motion counts as resisted by nothing.
 _NO_RESISTANCE = 1e-14
 
@@ -60,6 +64,24 @@ class DissipationSurface(ScaledSurface):
             forms[0] += np.trace(forms[0]) * self._free.T @ self._free
             terms = FormTerms(np.array([root_of(form) for form in forms]))
         return ConvexInverse(terms, even_directions(_STARTS).T, terms.corners())
+
+    @cached_property
+    def _one_twist_terms(self) -> list[Term] | None:
+        """The terms for one physical twist; None where numpy is the quicker."""
+        forms = self.scaled_forms
+        if len(forms) > _FEW:
+            return None
+        roots = np.array([root_of(form) for form in forms])
+        return one_load_terms(roots, np.full(len(forms), 0.5), self.scaling.twist_unit)
+
+    def _wrench_of_one(self, twist: Vector) -> Vector | None:
+        terms = self._one_twist_terms
+        load = None if terms is None else norm_gradient_of_one(terms, twist)
+        if load is None:
+            return None
+        # The gradient for physical twists is the physical wrench for a friction force of 1 N.
+        force = self.scaling.friction_force
+        return force * load[0], force * load[1], force * load[2]
 
     def _loads(self, twists: Floats) -> Floats:
         return self._terms.gradient(twists)

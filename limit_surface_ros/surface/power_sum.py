@@ -4,15 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import sqrt
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from limit_surface_ros.checks import as_floats, as_vectors
 from limit_surface_ros.errors import RangeError, ShapeError
+from limit_surface_ros.surface.one_load import (
+    gauge_of_one,
+    norm_gradient_of_one,
+    normal_of_one,
+    one_load_terms,
+)
 from limit_surface_ros.surface.power_sum_inverse import power_sum_inverse
-from limit_surface_ros.surface.power_sum_scale import log_scales
-from limit_surface_ros.surface.quadratic_form import as_psd_matrices, root_of
+from limit_surface_ros.surface.power_sum_scale import log_scales, scale_and_shares
+from limit_surface_ros.surface.quadratic_form import BLIND, as_psd_matrices, root_of
 from limit_surface_ros.surface.scaled_surface import ScaledSurface
 from limit_surface_ros.surface.scaling import Scaling
 
@@ -21,6 +28,7 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.surface.gauge_inverse import Inverse
+    from limit_surface_ros.surface.one_load import Term, Vector
 
 # Part of a twist along a load without limit, above which its power is infinite.
 _FREE = 1e-12
@@ -120,9 +128,11 @@ class PowerSum(ScaledSurface):
         Returns:
             Shape (...).
         """
-        columns = np.moveaxis(as_vectors("load", load), -1, 0)
-        forms = self._forms(self._images(columns))
-        return np.asarray(sum(q**p for q, p in zip(forms, self.exponents, strict=True)))[()]
+        array = as_vectors("load", load)
+        columns = array.reshape(-1, 3).T
+        forms = self._forms(self._images(columns), columns)
+        values = (forms ** self.exponents[:, np.newaxis]).sum(axis=0)
+        return np.asarray(values.reshape(array.shape[:-1]))[()]
 
     def gradient(self, load: ArrayLike) -> Floats:
         """Return the gradient of H; a term whose form is zero adds nothing to it.
@@ -136,36 +146,75 @@ class PowerSum(ScaledSurface):
         Returns:
             Shape (..., 3).
         """
-        columns = np.moveaxis(as_vectors("load", load), -1, 0)
+        array = as_vectors("load", load)
+        columns = array.reshape(-1, 3).T
         images = self._images(columns)
-        forms = self._forms(images)
-        weights = [
-            2.0 * p * _power(q, p - 1.0) for q, p in zip(forms, self.exponents, strict=True)
-        ]
-        return np.moveaxis(self._weighted_gradient(images, weights), 0, -1)
+        forms = self._forms(images, columns)
+        exponents = self.exponents[:, np.newaxis]
+        weights = np.power(forms, exponents - 1.0, out=np.zeros_like(forms), where=forms > 0.0)
+        images *= (2.0 * exponents * weights)[:, np.newaxis]
+        gradient = self._stacked_roots.T @ images.reshape(-1, images.shape[2])
+        return np.asarray(gradient.T.reshape(array.shape))
+
+    @cached_property
+    def _one_load_terms(self) -> list[Term]:
+        return one_load_terms(self._roots, self.exponents, self.scaling.wrench_unit)
+
+    @cached_property
+    def _is_norm(self) -> bool:
+        """Whether the load factor is the plain sum of |R_i f|."""
+        return len(self.matrices) == 1 or bool((self.exponents == 0.5).all())
+
+    @cached_property
+    def _stacked_roots(self) -> Floats:
+        """The R_i above each other, shape (3 k, 3)."""
+        return self._roots.reshape(-1, 3)
+
+    def _load_factor_of_one(self, wrench: Vector) -> float | None:
+        return gauge_of_one(self._one_load_terms, wrench)
+
+    def _twist_of_one(self, wrench: Vector) -> Vector | None:
+        # The terms take physical wrenches, so that the normal comes as a physical twist.
+        if self._is_norm:
+            normal = norm_gradient_of_one(self._one_load_terms, wrench)
+        else:
+            normal = normal_of_one(self._one_load_terms, wrench)
+        if normal is None:
+            return None
+        x, y, z = normal
+        turn = z * self.scaling.characteristic_length
+        length = sqrt(x * x + y * y + turn * turn)
+        return x / length, y / length, z / length
 
     def _load_factors(self, loads: Floats) -> Floats:
-        forms = self._forms(self._images(loads))
+        forms = self._forms(self._images(loads), loads)
+        if self._is_norm:
+            return np.asarray(np.sqrt(forms).sum(axis=0))
         return np.exp(-log_scales(forms, self.exponents))
 
     def _twists(self, loads: Floats) -> Floats:
         images = self._images(loads)
-        forms = self._forms(images)
-        log_alpha = log_scales(forms, self.exponents)
-        bounded = np.isfinite(log_alpha)
-        if not bounded.all():
+        forms = self._forms(images, loads)
+        if not forms.any(axis=0).all():
+            unlimited = loads[:, ~forms.any(axis=0)][:, 0].tolist()
             raise RangeError(
                 "this surface has no limit in the direction of a wrench: friction resists any "
-                f"amount of it, scaled direction {loads[:, ~bounded][:, 0].tolist()}"
+                f"amount of it, scaled direction {unlimited}"
             )
-        weights = [
-            p * _power(q, p - 1.0) * np.exp(2.0 * (p - 1.0) * log_alpha)
-            for q, p in zip(forms, self.exponents, strict=True)
-        ]
-        gradient = self._weighted_gradient(images, weights)
-        gradient /= np.abs(gradient).max(axis=0)
-        gradient /= np.sqrt((gradient * gradient).sum(axis=0))
-        return gradient
+        if self._is_norm:
+            weights = np.sqrt(forms)
+        else:
+            shares = scale_and_shares(forms, self.exponents)[1]
+            shares *= self.exponents[:, np.newaxis]
+            weights = np.divide(forms, shares, out=np.zeros_like(forms), where=shares > 0.0)
+        # A term that does not see the load adds nothing to its normal.
+        weights[weights == 0.0] = np.inf
+        images /= weights[:, np.newaxis]
+        gradient = self._stacked_roots.T @ images.reshape(-1, images.shape[2])
+        if not self._is_norm:
+            gradient /= np.abs(gradient).max(axis=0)
+        gradient /= np.sqrt(_squared(gradient))
+        return np.asarray(gradient)
 
     def _loads(self, twists: Floats) -> Floats:
         if len(self._free):
@@ -196,21 +245,26 @@ class PowerSum(ScaledSurface):
         return power_sum_inverse(roots, self.exponents)
 
     def _images(self, columns: Floats) -> Floats:
-        """Return R_i f, shape (k, 3, ...)."""
-        return np.tensordot(self._roots, columns, axes=1)
+        """Return R_i f, shape (k, 3, m), of columns (3, m)."""
+        return (self._stacked_roots @ columns).reshape(-1, 3, columns.shape[1])
 
-    def _forms(self, images: Floats) -> Floats:
-        """Return f' A_i f from the images R_i f, shape (k, ...)."""
-        return np.asarray(np.einsum("kc...,kc...->k...", images, images))
+    @cached_property
+    def _blind(self) -> Floats | None:
+        """Forms of unit loads that count as zero, shape (k, 1); None if all matrices see all."""
+        if np.abs(self._roots).any(axis=2).all():
+            return None
+        sizes: Floats = np.square(self._roots).sum(axis=(1, 2))[:, np.newaxis]
+        return BLIND * sizes
 
-    def _weighted_gradient(self, images: Floats, weights: list[Floats]) -> Floats:
-        """Return sum_i w_i A_i f from the images R_i f."""
-        total: Floats = np.zeros_like(images[0])
-        for root, image, weight in zip(self._roots, images, weights, strict=True):
-            total += np.tensordot(root.T, weight * image, axes=1)
-        return total
+    def _forms(self, images: Floats, loads: Floats) -> Floats:
+        """Return f' A_i f, shape (k, m), from the images R_i f and the loads f."""
+        forms: Floats = np.einsum("kcm,kcm->km", images, images)
+        if self._blind is not None:
+            forms[forms <= self._blind * _squared(loads)] = 0.0
+        return forms
 
 
-def _power(base: Floats, exponent: float) -> Floats:
-    """Return base^exponent, 0 where the base is 0 whatever the exponent."""
-    return np.power(base, exponent, out=np.zeros_like(base), where=base > 0.0)
+def _squared(columns: Floats) -> Floats:
+    """Return the squared lengths (m,) of columns (3, m)."""
+    x, y, z = columns
+    return np.asarray(x * x + y * y + z * z)

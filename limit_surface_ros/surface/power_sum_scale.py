@@ -14,7 +14,12 @@ _MAX_STEPS = 60
 
 
 def log_scales(forms: Floats, exponents: Floats) -> Floats:
-    """Return t = log(alpha) with sum_i (alpha^2 q_i)^p_i = 1.
+    """Return t = log(alpha) with sum_i (alpha^2 q_i)^p_i = 1; see `scale_and_shares`."""
+    return scale_and_shares(forms, exponents)[0]
+
+
+def scale_and_shares(forms: Floats, exponents: Floats) -> tuple[Floats, Floats]:
+    """Return t = log(alpha) with sum_i (alpha^2 q_i)^p_i = 1, and these terms.
 
     log(sum_i exp(2 p_i t + p_i log q_i)) is a rising convex function of t, so that Newton's
     method falls monotonically to its one root from any start beyond it. Such a start is the
@@ -25,21 +30,31 @@ def log_scales(forms: Floats, exponents: Floats) -> Floats:
         exponents: p_i, shape (k,).
 
     Returns:
-        Shape (m,); infinite where every form is zero: nothing limits that load.
+        t (m,), infinite where every form is zero: nothing limits that load; and the terms (k, m),
+        which add up to 1, but are 0 where t is infinite.
     """
-    slopes = 2.0 * exponents[:, np.newaxis]
+    seen = forms.any(axis=0)
+    if not seen.all():
+        t: Floats = np.full(forms.shape[1], np.inf)
+        shares: Floats = np.zeros_like(forms)
+        t[seen], shares[:, seen] = scale_and_shares(forms[:, seen], exponents)
+        return t, shares
     with np.errstate(divide="ignore"):
         logs = np.log(forms)
-    start = -0.5 * logs.max(axis=0)
-    t: Floats = start.copy()
-    todo = np.flatnonzero(np.isfinite(start))
+    t = -0.5 * logs.max(axis=0)
+    slopes = 2.0 * exponents
     offsets = exponents[:, np.newaxis] * logs
     for _ in range(_MAX_STEPS):
-        terms = np.exp(slopes * t[todo] + offsets[:, todo])
-        value = terms.sum(axis=0)
-        step = np.log(value) * value / (slopes * terms).sum(axis=0)
-        t[todo] -= step
-        todo = todo[np.abs(step) > 1e-9]
-        if len(todo) == 0:
+        shares = np.multiply.outer(slopes, t)
+        shares += offsets
+        np.exp(shares, out=shares)
+        value = shares.sum(axis=0)
+        step = np.log(value)
+        step *= value
+        step /= slopes @ shares
+        t -= step
+        if step.max(initial=0.0) < 1e-9:
             break
-    return t
+    np.multiply.outer(slopes, t, out=shares)
+    shares += offsets
+    return t, np.exp(shares, out=shares)

@@ -19,6 +19,9 @@ _TOLERANCE = 1e-10
 # Relative pivot below which a matrix has no further rank.
 _RANK_TOLERANCE = 8 * np.finfo(np.float64).eps
 
+# A form below this part of its trace is rounding: the load or motion is one it does not see.
+BLIND = 1e-28
+
 
 def as_psd_matrices(name: str, matrices: ArrayLike) -> Floats:
     """Return `matrices` as a read-only float64 array (k, 3, 3) of PSD matrices, k at least 1.

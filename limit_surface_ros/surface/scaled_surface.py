@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 import numpy as np
 
-from limit_surface_ros.checks import as_directions, as_positive, as_vectors
+from limit_surface_ros.checks import as_directions, as_positive, as_vectors, one_direction
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.one_load import Vector
     from limit_surface_ros.surface.scaling import Scaling
 
 Self = TypeVar("Self", bound="ScaledSurface")
@@ -54,6 +55,18 @@ class ScaledSurface(ABC):
     def _loads(self, twists: Floats) -> Floats:
         """Map scaled twists (3, m), none zero, to scaled loads (3, m) on the surface."""
 
+    def _load_factor_of_one(self, _wrench: Vector) -> float | None:
+        """Map one wrench in physical units; None leaves it to the map of many."""
+        return None
+
+    def _twist_of_one(self, _wrench: Vector) -> Vector | None:
+        """Map one wrench to a twist, both in physical units; None leaves it to the map of many."""
+        return None
+
+    def _wrench_of_one(self, _twist: Vector) -> Vector | None:
+        """Map one twist to a wrench, both in physical units; None leaves it to the map of many."""
+        return None
+
     @property
     def _block_columns(self) -> int:
         """Columns per block: a few dozen arrays of this length stay in the processor's cache."""
@@ -85,6 +98,12 @@ class ScaledSurface(ABC):
             ShapeError: The last axis does not hold three components.
             NotFiniteError: A component is NaN or infinite.
         """
+        one = one_direction(wrench)
+        if one is not None:
+            factor = self._load_factor_of_one(one)
+            if factor is not None:
+                scalar: Floats = np.float64(factor)
+                return scalar
         array = as_vectors("wrench", wrench)
         factors = np.empty(array.size // 3)
         for block, columns, sizes in self._blocks(array, self.scaling.wrench_unit):
@@ -106,6 +125,11 @@ class ScaledSurface(ABC):
             NotFiniteError: A component is NaN or infinite.
             ZeroVectorError: A wrench is zero.
         """
+        one = one_direction(wrench)
+        if one is not None:
+            twist = self._twist_of_one(one)
+            if twist is not None:
+                return np.array(twist)
         array = as_directions("wrench", wrench)
         return self._mapped(array, self.scaling.wrench_unit, self._twists, self.scaling.twist_unit)
 
@@ -124,6 +148,11 @@ class ScaledSurface(ABC):
             NotFiniteError: A component is NaN or infinite.
             ZeroVectorError: A twist is zero.
         """
+        one = one_direction(twist)
+        if one is not None:
+            wrench = self._wrench_of_one(one)
+            if wrench is not None:
+                return np.array(wrench)
         array = as_directions("twist", twist)
         return self._mapped(array, self.scaling.twist_unit, self._loads, self.scaling.wrench_unit)
 

@@ -132,6 +132,8 @@ def test_a_load_that_nothing_limits_never_moves_the_body():
     assert surface.load_factor([0.0, 0.0, 7.0]) == 0.0
     with pytest.raises(RangeError, match="no limit"):
         surface.twist_of_wrench([[1.0, 0.0, 0.0], [0.0, 0.0, 7.0]])
+    with pytest.raises(RangeError, match="no limit"):
+        surface.twist_of_wrench([0.0, 0.0, 7.0])
     with pytest.raises(RangeError, match="infinite"):
         surface.wrench_of_twist([1.0, 0.0, 0.1])
     np.testing.assert_allclose(surface.wrench_of_twist([2.0, 0.0, 0.0]), [1.0, 0.0, 0.0])

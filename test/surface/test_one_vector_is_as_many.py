@@ -1,0 +1,76 @@
+"""A single vector takes a lean path, which must tell the same and refuse the same as the batch."""
+
+import numpy as np
+import pytest
+
+from limit_surface_ros.errors import NotFiniteError, ShapeError, ZeroVectorError
+from limit_surface_ros.surface.dissipation import Dissipation
+from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.polynomial import Polynomial
+from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.scaling import Scaling
+
+RNG = np.random.default_rng(11)
+SCALING = Scaling(0.1, 5.0)
+ROOTS = RNG.standard_normal((3, 3, 3))
+MATRICES = np.swapaxes(ROOTS, 1, 2) @ ROOTS
+SURFACES = [
+    PowerSum.thesis(MATRICES[:1], SCALING),
+    PowerSum.thesis(MATRICES, SCALING),
+    PowerSum.norms(MATRICES, SCALING),
+    Dissipation(MATRICES, SCALING),
+    PointContacts(0.1 * RNG.standard_normal((4, 2)), [1, 2, 1, 1], SCALING),
+    Polynomial([1, 0, 0, 1 / 3, 0, 1, 0, 0, 0, 0, 2, 0, 1, 0, 3], SCALING),
+]
+MAPS = ["load_factor", "twist_of_wrench", "wrench_of_twist"]
+
+
+@pytest.mark.parametrize("surface", SURFACES, ids=lambda surface: surface.kind)
+@pytest.mark.parametrize("name", MAPS)
+@pytest.mark.parametrize("size", [1e-200, 1e-9, 1.0, 1e9, 1e200])
+def test_one_vector_gives_what_it_gives_among_many(surface, name, size):
+    function = getattr(surface, name)
+    vectors = size * RNG.standard_normal((20, 3))
+    many = function(vectors)
+    for form in (np.array, list, tuple, lambda v: v[np.newaxis]):
+        one = np.array([np.squeeze(function(form(vector))) for vector in vectors])
+        np.testing.assert_allclose(one, many, rtol=1e-9, atol=1e-12 * np.abs(many).max())
+
+
+@pytest.mark.parametrize("surface", SURFACES, ids=lambda surface: surface.kind)
+@pytest.mark.parametrize("name", MAPS)
+def test_whole_numbers_and_lists_are_vectors_too(surface, name):
+    function = getattr(surface, name)
+    np.testing.assert_allclose(function([1, 2, 3]), function(np.array([1.0, 2.0, 3.0])))
+    np.testing.assert_allclose(function(np.float32([1, 2, 3])), function([1, 2, 3]), rtol=1e-12)
+
+
+@pytest.mark.parametrize("surface", SURFACES, ids=lambda surface: surface.kind)
+@pytest.mark.parametrize("name", MAPS)
+def test_one_bad_vector_is_refused_as_many_are(surface, name):
+    function = getattr(surface, name)
+    for bad, error in [
+        ([1.0, np.nan, 0.0], NotFiniteError),
+        ([np.inf, 0.0, 0.0], NotFiniteError),
+        ([1.0, 2.0], ShapeError),
+        (["a", 1.0, 2.0], ShapeError),
+        (3.0, ShapeError),
+        ([[1.0, 2.0, 3.0], [1.0, 2.0]], ShapeError),
+    ]:
+        with pytest.raises(error):
+            function(bad)
+    if name != "load_factor":
+        with pytest.raises(ZeroVectorError, match="no direction"):
+            function([0.0, 0.0, 0.0])
+    else:
+        assert function([0.0, 0.0, 0.0]) == 0.0
+
+
+@pytest.mark.parametrize("surface", SURFACES[3:5], ids=lambda surface: surface.kind)
+def test_a_twist_at_a_kink_gives_the_middle_of_its_facet(surface):
+    contacts = SURFACES[4]
+    x, y = contacts.points[1]
+    twist = np.array([y, -x, 1.0])
+    np.testing.assert_allclose(
+        contacts.wrench_of_twist(twist), contacts.wrench_of_twist([twist])[0], rtol=1e-12
+    )
