@@ -1,13 +1,15 @@
 """Run nodes until SIGINT or SIGTERM, and end with exit code 0, no traceback and no reply lost.
 
-The signals are blocked in all threads and awaited in one: no callback is cut in the middle, as
-rclpy's own handlers would do. What is being answered is answered; then the nodes end.
+The signals only wake a thread that asks the executor to end between two callbacks: none is cut in
+the middle, as rclpy's own handlers would do. What is being answered is answered; then the nodes
+end.
 """
 
 from __future__ import annotations
 
 import argparse
 import signal
+import socket
 import threading
 import traceback
 from typing import TYPE_CHECKING, Any
@@ -53,7 +55,12 @@ def run(make_nodes: Callable[[], Sequence[Node]], description: str, argv: Sequen
     Returns:
         The process's exit code: 0 after SIGINT or SIGTERM, 1 if the nodes could not start.
     """
-    signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
+    # Whichever thread the kernel picks (OpenBLAS has some of its own), Python writes to this end.
+    woken, wakes = socket.socketpair()
+    wakes.setblocking(False)
+    signal.set_wakeup_fd(wakes.fileno())
+    for number in ENDING:
+        signal.signal(number, lambda *_: None)
     parser = argparse.ArgumentParser(
         description=description,
         epilog="Parameters, remappings and the namespace are given as ROS arguments: "
@@ -71,7 +78,7 @@ def run(make_nodes: Callable[[], Sequence[Node]], description: str, argv: Sequen
     executor = _executor(nodes[0])
     for node in nodes:
         executor.add_node(node)
-    _spin_until_signal(executor)
+    _spin_until_woken(executor, woken, wakes)
     executor.shutdown()
     for node in nodes:
         node.destroy_node()
@@ -90,11 +97,11 @@ def _executor(node: Node) -> Executor:
     return SingleThreadedExecutor()
 
 
-def _spin_until_signal(executor: Executor) -> None:
+def _spin_until_woken(executor: Executor, woken: socket.socket, wakes: socket.socket) -> None:
     ended: Any = Future()
 
     def wait() -> None:
-        signal.sigwait(ENDING)
+        woken.recv(1)
         # As a task it is run between callbacks, and wakes an executor that waits.
         executor.create_task(ended.set_result, None)
 
@@ -108,9 +115,8 @@ def _spin_until_signal(executor: Executor) -> None:
             rclpy.logging.get_logger("limit_surface_ros").error(
                 f"while spinning: {traceback.format_exc()}", throttle_duration_sec=5.0
             )
-    if not ended.done():
-        # The context was shut down from elsewhere: let the waiting thread go.
-        signal.pthread_kill(waiter.ident, signal.SIGTERM)
+    # If the context was shut down from elsewhere, the thread still waits.
+    wakes.send(b"\0")
     waiter.join()
 
 
