@@ -14,21 +14,25 @@ from limit_surface_interfaces.srv import (
 )
 
 from limit_surface_ros.files.surface_file import SurfaceModel, read_surface_model
-from limit_surface_ros.nodes import convert, frames, planar_inputs
+from limit_surface_ros.nodes import convert, frames, planar_inputs, surface_markers
 from limit_surface_ros.nodes.model_host import model_settings
 from limit_surface_ros.nodes.model_info import model_info
 from limit_surface_ros.nodes.model_node import ModelNode
 from limit_surface_ros.nodes.planar_inputs import PlanarInputs
+from limit_surface_ros.nodes.surface_markers import SurfaceMarkers
 from limit_surface_ros.surface.planar import power
 
 if TYPE_CHECKING:
     from std_msgs.msg import Header
+
+    from limit_surface_ros.surface.protocol import LimitSurface
 
 NAME = "limit_surface"
 SETTINGS = (
     *model_settings("config/models", "limit surfaces"),
     *frames.SETTINGS,
     *planar_inputs.SETTINGS,
+    *surface_markers.SETTINGS,
 )
 
 
@@ -47,6 +51,7 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
         """Read the models and start serving."""
         super().__init__(NAME, SETTINGS, read_surface_model, **options)
         self._inputs = PlanarInputs(self.values, frames.Frames(self, self.values), self.report)
+        self._markers = SurfaceMarkers(self, self._present)
         self._twists = self.add_output(TwistStamped, "predicted_twist")
         self._wrenches = self.add_output(WrenchStamped, "required_wrench")
         self.add_service(WrenchToTwist, "wrench_to_twist", self._wrench_to_twist)
@@ -57,12 +62,17 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
         self.add_input(WrenchStamped, "wrench", self._predict)
         self.add_input(TwistStamped, "twist", self._require)
 
+    def _present(self) -> tuple[SurfaceModel, LimitSurface]:
+        model = self.models[""]
+        return model, self._inputs.surface(model)
+
     def _wrench_to_twist(
         self, request: WrenchToTwist.Request, response: WrenchToTwist.Response
     ) -> None:
         model = self.models[request.model]
         load = self._inputs.wrench(model, request.wrench)
         surface = load.surface
+        self._markers.note(model, surface, load.vector)
         factor = float(surface.load_factor(load.vector))
         twist = surface.twist_of_wrench(load.vector)
         convert.fill_twist(response.twist.twist, twist)
@@ -107,6 +117,7 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
     def _predict(self, message: WrenchStamped) -> None:
         model = self.models[""]
         load = self._inputs.wrench(model, message)
+        self._markers.note(model, load.surface, load.vector)
         answer = TwistStamped()
         if load.surface.load_factor(load.vector) >= 1.0:
             convert.fill_twist(answer.twist, load.surface.twist_of_wrench(load.vector))
