@@ -14,6 +14,7 @@ import tempfile
 import threading
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import rclpy
@@ -26,6 +27,9 @@ from limit_surface_ros.decay.exponential_sum import ExponentialSum
 from limit_surface_ros.files.decay_file import DecayModel, write_decay_model
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
 from limit_surface_ros.surface.power_sum import PowerSum
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 SECONDS = 10.0
 PLAIN_TIMER = """
@@ -73,20 +77,27 @@ def write_models(folder: Path) -> list[str]:
     ]
 
 
+def wait(condition: Callable[[], object]) -> None:
+    """Wait until a condition holds, at most 20 s."""
+    end = time.monotonic() + 20.0
+    while not condition():
+        if time.monotonic() > end:
+            raise TimeoutError("nothing came from the publisher within 20 s")
+        time.sleep(0.01)
+
+
 def measure(node: Node, rate: float, program: list[str], topic: str, onset: bool) -> list[str]:
     """Run one publisher for `SECONDS` and return its row of the table."""
     listener = Listener(node, topic)
-    process = subprocess.Popen(program)
+    process = subprocess.Popen(program, stderr=subprocess.DEVNULL)
     try:
         if onset:
             starter = node.create_publisher(WrenchStamped, "/decay/onset", 10)
-            while not starter.get_subscription_count():
-                time.sleep(0.05)
+            wait(starter.get_subscription_count)
             message = WrenchStamped()
             message.wrench.force.x = 1.0
             starter.publish(message)
-        while not listener.rows:
-            time.sleep(0.01)
+        wait(lambda: listener.rows)
         first = listener.rows[0][0]
         time.sleep(SECONDS + 0.5)
     finally:
@@ -126,11 +137,9 @@ def main() -> int:
         models = write_models(Path(folder))
         for rate in (100.0, 1000.0):
             ours = [sys.executable, "-m", "limit_surface_ros.nodes.decay_node", "--ros-args"]
-            for executor_name in ("single_threaded", "events"):
-                program = [*ours, *models, "-p", f"rate:={rate}"]
-                program += ["-p", f"executor:={executor_name}", "--log-level", "warn"]
-                row = measure(node, rate, program, "/decay/wrench", onset=True)
-                print("| " + " | ".join([f"decay node, {executor_name}", *row]) + " |")
+            ours += [*models, "-p", f"rate:={rate}", "--log-level", "warn"]
+            row = measure(node, rate, ours, "/decay/wrench", onset=True)
+            print("| " + " | ".join(["decay node", *row]) + " |")
             plain = [sys.executable, "-c", PLAIN_TIMER, str(rate)]
             row = measure(node, rate, plain, "/plain", onset=False)
             print("| " + " | ".join(["plain rclpy timer", *row]) + " |")
