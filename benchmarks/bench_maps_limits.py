@@ -1,0 +1,122 @@
+"""How far batches of maps are from a plain C loop, whether cost stays linear, and peak memory."""
+
+from __future__ import annotations
+
+import sys
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from c_maps import compiled, twists_in_c
+from interleaved import interleaved
+
+from limit_surface_ros.surface.dissipation import Dissipation
+from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.scaling import Scaling
+
+SIZES = (100, 1_000, 10_000, 100_000, 1_000_000)
+SCALING = Scaling(0.1, 5.0)
+
+
+def random_matrices(count: int, seed: int = 0):
+    """Return positive definite matrices, shape (count, 3, 3)."""
+    factors = np.random.default_rng(seed).normal(size=(count, 3, 3))
+    return factors @ factors.transpose(0, 2, 1) / 3 + 0.1 * np.eye(3)
+
+
+def wrenches(count: int, seed: int = 1):
+    """Return loads of all directions [N, N, N m], shape (count, 3)."""
+    return np.random.default_rng(seed).normal(size=(count, 3)) * SCALING.wrench_unit
+
+
+def surfaces() -> dict[str, object]:
+    """Return a surface of each kind that is served."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 7)[:-1]
+    ring = 0.08 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return {
+        "ellipsoid": PowerSum.thesis(random_matrices(1), SCALING),
+        "thesis, 3 terms": PowerSum.thesis(random_matrices(3), SCALING),
+        "3 norms": PowerSum.norms(random_matrices(3), SCALING),
+        "dissipation, 4 terms": Dissipation(random_matrices(4), SCALING),
+        "6 support points": PointContacts(ring, np.full(6, 0.8), SCALING),
+    }
+
+
+def against_c() -> None:
+    """Compare wrench to twist with the C loop."""
+    library = compiled()
+    print("### Wrench to twist in batches against a plain C loop\n")
+    if library is None:
+        print("There is no C compiler here: not measured.\n")
+        return
+    print("One thread. Goal: at most 3 times the loop's time.\n")
+    print("| kind | loads | ours [M/s] | C [M/s] | ours / C | goal |")
+    print("|---|---|---|---|---|---|")
+    for name in ("thesis, 3 terms", "3 norms"):
+        surface = surfaces()[name]
+        loop = twists_in_c(library, surface)
+        check = wrenches(1000)
+        assert np.abs(surface.twist_of_wrench(check) - loop(check)).max() < 1e-8 / 0.1
+        for count in SIZES:
+            rows = wrenches(count)
+            times = interleaved(
+                {
+                    "ours": lambda s=surface, r=rows: s.twist_of_wrench(r),
+                    "c": lambda f=loop, r=rows: f(r),
+                },
+                rounds=5 if count == SIZES[-1] else 9,
+            )
+            ratio = times["ours"] / times["c"]
+            verdict = "3 met" if ratio <= 3.0 else "3 missed"
+            ours, theirs = (count / times[key] / 1e6 for key in ("ours", "c"))
+            print(
+                f"| {name} | {count} | {ours:.2f} | {theirs:.2f} | {ratio:.2f} | {verdict} |",
+                flush=True,
+            )
+    print()
+
+
+def cost_and_memory() -> None:
+    """Measure time per vector from 1e4 to 1e6 and the peak of memory at 1e6."""
+    print("### Cost per vector and peak memory\n")
+    print(
+        "Time per vector in a batch of 1e6 over that in one of 1e4 (goal: about 1), and the peak "
+        "of memory during the batch of 1e6 over the size of its result (goal: below 10).\n"
+    )
+    print("| kind | map | 1e4 [ns each] | 1e6 [ns each] | ratio | peak / result |")
+    print("|---|---|---|---|---|---|")
+    for name, surface in surfaces().items():
+        for method in ("load_factor", "twist_of_wrench", "wrench_of_twist"):
+            call = getattr(surface, method)
+            few, many = wrenches(10_000), wrenches(1_000_000)
+            short = interleaved({"few": lambda c=call, r=few: c(r)}, rounds=5)["few"] / len(few)
+            long = interleaved({"many": lambda c=call, r=many: c(r)}, rounds=1)["many"] / len(many)
+            peak = peak_over_result(call, many)
+            print(
+                f"| {name} | {method} | {1e9 * short:.0f} | {1e9 * long:.0f} "
+                f"| {long / short:.2f} | {peak:.1f} |",
+                flush=True,
+            )
+
+
+def peak_over_result(call, rows) -> float:
+    """Return the most memory in use during a call over the size of its result."""
+    tracemalloc.start()
+    result = call(rows)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return peak / result.nbytes
+
+
+def main() -> None:
+    """Print both tables."""
+    against_c()
+    cost_and_memory()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,91 @@
+/* The map from wrench to twist as a plain loop: what compiled code could reach at best.
+ *
+ * The same formulas as limit_surface_ros.surface.power_sum, one load after the other. roots holds
+ * k factors R_i (3 x 3, row by row) with A_i = R_i' R_i; in and out hold n rows of 3.
+ */
+#include <math.h>
+#include <stddef.h>
+
+enum { MOST_TERMS = 16, MOST_STEPS = 60 };
+
+static double image_of(const double *root, const double *load, double *image)
+{
+    double form = 0.0;
+    for (int row = 0; row < 3; row++) {
+        image[row] = root[3 * row] * load[0] + root[3 * row + 1] * load[1]
+            + root[3 * row + 2] * load[2];
+        form += image[row] * image[row];
+    }
+    return form;
+}
+
+static void add_pull(const double *root, const double *image, double weight, double *normal)
+{
+    for (int column = 0; column < 3; column++)
+        normal[column] += weight * (root[column] * image[0] + root[3 + column] * image[1]
+            + root[6 + column] * image[2]);
+}
+
+static void scale_load(const double *in, const double *unit, double *load)
+{
+    double size = fmax(fmax(fabs(in[0]), fabs(in[1])), fabs(in[2]));
+    for (int column = 0; column < 3; column++)
+        load[column] = in[column] / size / unit[column];
+}
+
+static void write_twist(const double *normal, const double *unit, double *out)
+{
+    double norm = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+    for (int column = 0; column < 3; column++)
+        out[column] = normal[column] / norm * unit[column];
+}
+
+/* H(f) = sum_i (f' A_i f)^p_i: the scale by Newton's method on its logarithm, then the normal. */
+void power_sum_twists(const double *roots, const double *powers, int terms,
+    const double *wrench_unit, const double *twist_unit, const double *in, double *out, size_t n)
+{
+    double images[3 * MOST_TERMS], forms[MOST_TERMS], logs[MOST_TERMS];
+    for (size_t i = 0; i < n; i++, in += 3, out += 3) {
+        double load[3], normal[3] = {0.0, 0.0, 0.0}, largest = -INFINITY;
+        scale_load(in, wrench_unit, load);
+        for (int term = 0; term < terms; term++) {
+            forms[term] = image_of(roots + 9 * term, load, images + 3 * term);
+            logs[term] = log(forms[term]);
+            largest = fmax(largest, logs[term]);
+        }
+        double t = -0.5 * largest;
+        for (int step = 0; step < MOST_STEPS; step++) {
+            double value = 0.0, slope = 0.0;
+            for (int term = 0; term < terms; term++) {
+                double part = exp(powers[term] * (2.0 * t + logs[term]));
+                value += part;
+                slope += 2.0 * powers[term] * part;
+            }
+            double change = log(value) * value / slope;
+            t -= change;
+            if (fabs(change) <= 1e-9)
+                break;
+        }
+        for (int term = 0; term < terms; term++)
+            if (forms[term] > 0.0)
+                add_pull(roots + 9 * term, images + 3 * term,
+                    powers[term] * exp((powers[term] - 1.0) * (logs[term] + 2.0 * t)), normal);
+        write_twist(normal, twist_unit, out);
+    }
+}
+
+/* H(f) = sum_i sqrt(f' A_i f): the normal needs no scale. */
+void norm_sum_twists(const double *roots, int terms, const double *wrench_unit,
+    const double *twist_unit, const double *in, double *out, size_t n)
+{
+    for (size_t i = 0; i < n; i++, in += 3, out += 3) {
+        double load[3], image[3], normal[3] = {0.0, 0.0, 0.0};
+        scale_load(in, wrench_unit, load);
+        for (int term = 0; term < terms; term++) {
+            double form = image_of(roots + 9 * term, load, image);
+            if (form > 0.0)
+                add_pull(roots + 9 * term, image, 1.0 / sqrt(form), normal);
+        }
+        write_twist(normal, twist_unit, out);
+    }
+}
