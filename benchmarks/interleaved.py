@@ -23,10 +23,10 @@ def interleaved(
     """
     repeats = {}
     for name, call in ways.items():
+        call()
         begin = time.perf_counter()
         call()
-        call()
-        repeats[name] = 1 + int(least / max((time.perf_counter() - begin) / 2, 1e-7))
+        repeats[name] = 1 + int(least / max(time.perf_counter() - begin, 1e-7))
     times: dict[str, list[float]] = {name: [] for name in ways}
     collects = gc.isenabled()
     gc.disable()
