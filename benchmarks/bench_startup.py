@@ -1,0 +1,169 @@
+"""From process start to the first answered call: our node against an empty one, and many models.
+
+Needs a sourced ROS 2 with this package built; `make bench` sees to it.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING
+
+import numpy as np
+import rclpy
+from limit_surface_interfaces.srv import WrenchToTwist
+from std_srvs.srv import Trigger
+
+from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
+from limit_surface_ros.surface.power_sum import PowerSum
+
+if TYPE_CHECKING:
+    from rclpy.client import Client
+    from rclpy.node import Node
+
+HERE = Path(__file__).resolve().parent
+ROUNDS = 9
+GOAL = 0.3
+MODELS = (1, 1_000, 10_000)
+PATIENCE = 120.0
+SLOW_MODULES = ("scipy", "scipy.optimize", "matplotlib", "limit_surface_ros.fitting")
+NODE = [sys.executable, "-m", "limit_surface_ros.nodes.limit_surface_node"]
+EMPTY = [sys.executable, str(HERE / "empty_node.py")]
+
+
+def first_answer(
+    asker: Node, client: Client, request: object, command: list[str]
+) -> tuple[float, float, object]:
+    """Start a node, call it until it answers, end it.
+
+    Returns:
+        Time from process start to the answer [s], resident memory then [MB], and the answer.
+    """
+    begin = time.perf_counter()
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        while not client.service_is_ready():
+            assert process.poll() is None, f"{command} ended"
+            assert time.perf_counter() - begin < PATIENCE, f"{command} does not answer"
+            time.sleep(0.002)
+        future = client.call_async(request)
+        rclpy.spin_until_future_complete(asker, future, timeout_sec=PATIENCE)
+        seconds = time.perf_counter() - begin
+        return seconds, resident(process.pid), future.result()
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait()
+        # The next one must be discovered anew.
+        while client.service_is_ready():
+            time.sleep(0.002)
+
+
+def resident(pid: int) -> float:
+    """Return the resident memory of a process [MB]; NaN where the system does not tell."""
+    status = Path(f"/proc/{pid}/status")
+    if not status.exists():
+        return float("nan")
+    (line,) = (line for line in status.read_text().splitlines() if line.startswith("VmRSS"))
+    return int(line.split()[1]) / 1024
+
+
+def write_models(folder: Path, count: int) -> None:
+    """Write `count` models of three terms that differ in their names."""
+    surface = PowerSum.thesis([np.eye(3), 2.0 * np.eye(3), 3.0 * np.eye(3)])
+    first = folder / "object_00000.yaml"
+    write_surface_model(SurfaceModel("object_00000", surface), first)
+    text = first.read_text()
+    for i in range(1, count):
+        name = f"object_{i:05d}"
+        (folder / f"{name}.yaml").write_text(text.replace("object_00000", name))
+
+
+def import_time(module: str) -> float:
+    """Return how long a fresh process takes to start and import a module [s]."""
+    begin = time.perf_counter()
+    subprocess.run([sys.executable, "-c", f"import {module}"], check=True)
+    return time.perf_counter() - begin
+
+
+def imports() -> None:
+    """Print import times, and what the node's import brings."""
+    modules = ["sys", "numpy", "rclpy.node", "limit_surface_ros.files.surface_file"]
+    modules += ["limit_surface_ros.nodes.limit_surface_node"]
+    modules += ["scipy.optimize", "limit_surface_ros.tools.fit_surface"]
+    times: dict[str, list[float]] = {module: [] for module in modules}
+    for _ in range(ROUNDS):
+        for module in modules:
+            times[module].append(import_time(module))
+    base = median(times.pop("sys"))
+    print("### Import times\n")
+    print("Of a fresh process, less that of one that imports nothing.\n")
+    print("| module | time [s] |\n|---|---|")
+    for module, values in times.items():
+        print(f"| {module} | {median(values) - base:.2f} |")
+    code = (
+        "import sys, limit_surface_ros.nodes.limit_surface_node;"
+        f"print(*[name for name in {SLOW_MODULES} if name in sys.modules])"
+    )
+    brought = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+    found = brought.stdout.decode().strip() or "none"
+    print(f"\nOf {', '.join(SLOW_MODULES)}, the node's import brings: {found} (goal: none).\n")
+
+
+def start_up(asker: Node, ours: Client, empty: Client, request: WrenchToTwist.Request) -> None:
+    """Print the time to the first answer of the node and of an empty one."""
+    times: dict[str, list[float]] = {"empty": [], "ours": []}
+    for _ in range(ROUNDS):
+        times["empty"].append(first_answer(asker, empty, Trigger.Request(), EMPTY)[0])
+        times["ours"].append(first_answer(asker, ours, request, NODE)[0])
+    middle = {name: median(values) for name, values in times.items()}
+    more = middle["ours"] - middle["empty"]
+    print("### From process start to the first answered call\n")
+    print("| node | median [s] | least [s] | most [s] |\n|---|---|---|---|")
+    for name, label in (("empty", "empty rclpy node"), ("ours", "limit_surface")):
+        values = times[name]
+        print(f"| {label} | {middle[name]:.2f} | {min(values):.2f} | {max(values):.2f} |")
+    verdict = "met" if more <= GOAL else "missed"
+    print(f"\nOurs takes {more:.2f} s more (goal: at most {GOAL} s: {verdict}).\n", flush=True)
+
+
+def many_models(asker: Node, client: Client, request: WrenchToTwist.Request) -> None:
+    """Print start-up time and memory with few and with many models."""
+    print("### Many models in one node\n")
+    print("| models | first answer [s] | resident memory [MB] | each model [ms] | [kB] |")
+    print("|---|---|---|---|---|")
+    base = (0.0, 0.0)
+    for count in MODELS:
+        with tempfile.TemporaryDirectory() as name:
+            write_models(Path(name), count)
+            command = [*NODE, "--ros-args", "-p", f"model_files:=[{name}]"]
+            seconds, memory, answer = first_answer(asker, client, request, command)
+        assert answer.error_code == 0, answer.error_msg
+        base = base if any(base) else (seconds, memory)
+        each = ((seconds - base[0]) / count * 1e3, (memory - base[1]) / count * 1e3)
+        print(f"| {count} | {seconds:.2f} | {memory:.0f} | {each[0]:.2f} | {each[1]:.1f} |")
+
+
+def main() -> None:
+    """Print all tables."""
+    imports()
+    # Other robots in the network are not part of the measurement.
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    rclpy.init()
+    asker = rclpy.create_node("bench_startup")
+    request = WrenchToTwist.Request()
+    request.wrench.header.frame_id = "object"
+    request.wrench.wrench.force.x = 1.0
+    ours = asker.create_client(WrenchToTwist, "limit_surface/wrench_to_twist")
+    start_up(asker, ours, asker.create_client(Trigger, "empty"), request)
+    many_models(asker, ours, request)
+    rclpy.shutdown()
+
+
+if __name__ == "__main__":
+    main()
