@@ -94,9 +94,7 @@ def cost_and_memory() -> None:
         f"take more than {PATIENCE:.0f} s; beside 1e5 results the memory of one block, which does "
         "not grow, looks large.\n"
     )
-    print(
-        "| kind | map | vectors | small [ns each] | large [ns each] | ratio | peak [MB] | / result |"
-    )
+    print("| kind | map | vectors | small [ns] | large [ns] | ratio | peak [MB] | / result |")
     print("|---|---|---|---|---|---|---|---|")
     for name, surface in surfaces().items():
         for method in ("load_factor", "twist_of_wrench", "wrench_of_twist"):
