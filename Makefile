@@ -12,7 +12,7 @@ help: ## Show what can be made
 	@echo "limit_surface_ros: make TARGET [ARGS=\"...\"] [PYTHON=python3.12]"
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|'
 
-demo: ## Start the node, call its services, print a table (ARGS go to demo)
+demo: ## Start both nodes, call their services, print tables (ARGS go to demo)
 	@scripts/with_ros --isolated -- python3 $(PROGRAMS)/demo $(ARGS)
 
 run: ## Serve the models of config/ until Ctrl-C (ARGS go to limit_surface_node)

@@ -1,9 +1,11 @@
-"""Program: show the limit_surface node at work.
+"""Program: show the two nodes at work.
 
-Starts the node in a process of its own, asks it from this one what a handful of loads do to the
-body of the default model, prints a table, and checks each answer: the load that the answered
-motion needs must do as much work on it as the limit load of the same direction (the principle of
-maximum dissipation, there and back through both services). The exit code tells whether all agree.
+Starts both nodes in a process of their own and asks the first from this one what a handful of
+loads do to the body of the default model, prints a table, and checks each answer: the load that
+the answered motion needs must do as much work on it as the limit load of the same direction (the
+principle of maximum dissipation, there and back through both services). Then it gives the second
+an onset, prints the falling wrench, and compares the time at which sliding stops with its closed
+form. The exit code tells whether all agree.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 from geometry_msgs.msg import Twist, TwistStamped, Wrench, WrenchStamped
 from limit_surface_interfaces.srv import ListModels, TwistToWrench, WrenchToTwist
 
-from limit_surface_ros.nodes import convert
+from limit_surface_ros.nodes import convert, demo_decay
 from limit_surface_ros.nodes.service_client import ServiceClient
 
 if TYPE_CHECKING:
@@ -114,16 +116,22 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.parse_args(argv)
     namespace = f"/demo_{os.getpid()}"
     try:
-        with _running_node(namespace), ServiceClient("demo") as client:
-            return _show(Demo(client, namespace))
+        with _running_nodes(namespace), ServiceClient("demo") as client:
+            demo = Demo(client, namespace)
+            agrees = _show(demo)
+            push = [3.0 * part for part in demo.limit_load([1.0, 0.0, 0.0])]
+            agrees &= demo_decay.show(client, namespace, demo.model.frame_id, push)
     except (RuntimeError, TimeoutError) as error:
         print(f"demo: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         return 130
+    if not agrees:
+        print("demo: MISMATCH, see above", file=sys.stderr)
+    return 0 if agrees else 1
 
 
-def _show(demo: Demo) -> int:
+def _show(demo: Demo) -> bool:
     model = demo.model
     print(f"model {model.name} ({model.kind}, {model.terms} terms), frame {model.frame_id}\n")
     print(HEADING)
@@ -146,20 +154,20 @@ def _show(demo: Demo) -> int:
     print()
     if wrong:
         print(f"MISMATCH beyond {TOLERANCE:g}: {', '.join(wrong)}")
-        return 1
+        return False
     print(f"all {len(answers)} round trips agree within {TOLERANCE:g}")
-    return 0
+    return True
 
 
 @contextlib.contextmanager
-def _running_node(namespace: str) -> Iterator[None]:
-    """Run the node in a process of its own, and end it as Ctrl-C would."""
-    command = [sys.executable, "-m", "limit_surface_ros.nodes.limit_surface_node"]
+def _running_nodes(namespace: str) -> Iterator[None]:
+    """Run the nodes in a process of their own, and end it as Ctrl-C would."""
+    command = [sys.executable, "-m", "limit_surface_ros.nodes.force_motion_nodes"]
     process = subprocess.Popen([*command, "--ros-args", "-r", f"__ns:={namespace}"])
     try:
         yield
         if process.poll() is not None:
-            raise RuntimeError(f"the node ended early with exit code {process.returncode}")
+            raise RuntimeError(f"the nodes ended early with exit code {process.returncode}")
     finally:
         process.send_signal(signal.SIGINT)
         try:
@@ -168,7 +176,7 @@ def _running_node(namespace: str) -> Iterator[None]:
             process.kill()
             code = process.wait()
     if code:
-        raise RuntimeError(f"the node ended with exit code {code}")
+        raise RuntimeError(f"the nodes ended with exit code {code}")
 
 
 def _twist(twist: Sequence[float]) -> Twist:

@@ -18,3 +18,17 @@ def test_the_demonstration_prints_a_table_and_checks_it():
     assert code == 0, output
     assert len(re.findall(r"^.*\b(?:slides|sticks)\b.*e[-+]\d\d$", output, re.MULTILINE)) == 5
     assert "round trips agree" in output
+
+
+def test_the_demonstration_shows_a_wrench_that_falls_until_sliding_stops():
+    with Program("demo") as program:
+        code, output = program.ended()
+    assert code == 0, output
+    rows = re.findall(
+        r"^ *\d+\.\d{3}(?: +-?\d+\.\d{4}){3} +\d+\.\d{3}  (\w+)$", output, re.MULTILINE
+    )
+    assert len(rows) == 8
+    assert rows == sorted(rows, reverse=True)
+    assert set(rows) == {"slides", "rests"}
+    found, closed = re.search(r"stops after (\S+) s; .* says (\S+) s", output).groups()
+    assert float(found) == pytest.approx(float(closed), abs=1e-6)
