@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.decay.exponential_sum import Complexes
 
+# Rates that are evaluated at a time: their waves fit into the cache.
+BLOCK = 4096
+
 
 @dataclass(frozen=True, eq=False)
 class DelaySystem:
@@ -79,14 +82,22 @@ class DelaySystem:
         """Return h(lambda) [1/s] and h'(lambda) [1] for rates lambda [1/s] of any shape."""
         given = np.asarray(rates, dtype=np.complex128)
         flat = given.ravel()
-        echoes = np.exp(np.multiply.outer(-flat, self.delays))
-        value: Complexes = flat - echoes @ self.strengths
+        value = np.empty(flat.shape, dtype=np.complex128)
+        slope = np.empty(flat.shape, dtype=np.complex128)
+        for start in range(0, len(flat), BLOCK):
+            block = slice(start, start + BLOCK)
+            value[block], slope[block] = self._evaluate(flat[block])
+        return value.reshape(given.shape), slope.reshape(given.shape)
+
+    def _evaluate(self, rates: Complexes) -> tuple[Complexes, Complexes]:
+        echoes = np.exp(np.multiply.outer(-rates, self.delays))
+        value: Complexes = rates - echoes @ self.strengths
         slope: Complexes = echoes @ (self.strengths * self.delays) + np.complex128(1.0)
-        if self.pieces is not None and flat.size:
-            distributed, distributed_slope = self.pieces.transform(flat)
+        if self.pieces is not None:
+            distributed, distributed_slope = self.pieces.transform(rates)
             value = value - distributed
             slope = slope - distributed_slope
-        return value.reshape(given.shape), slope.reshape(given.shape)
+        return value, slope
 
     def root_bound(self, real_part: float) -> float:
         """Return a radius [1/s] within which all roots with Re lambda >= `real_part` lie.

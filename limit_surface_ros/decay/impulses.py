@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 # Samples on either side that show the background, and those next to an impulse that do not.
 WINDOW, SKIPPED = 10, 3
+# A peak of which less than this remains in sum is no impulse.
+LEAST_NET = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +65,7 @@ def find_impulses(kernel: MemoryKernel, threshold: float = 0.02) -> Impulses:
         strongest = int(cluster[np.argmax(np.abs(values[cluster]))])
         found.append(_measure(kernel, strongest))
     weight = max((abs(strength) for _, strength in found), default=0.0)
-    kept = [pair for pair in found if abs(pair[1]) >= fraction * weight]
+    kept = [pair for pair in found if pair[1] and abs(pair[1]) >= fraction * weight]
     return Impulses(np.array([d for d, _ in kept]), np.array([c for _, c in kept]))
 
 
@@ -94,5 +96,8 @@ def _measure(kernel: MemoryKernel, peak: int) -> tuple[float, float]:
         share = np.clip(around - peak - place, 0.0, 1.0)
         background = (1.0 - share) * left(around - peak) + share * right(around - peak)
         excess = values[around] - background
+        if abs(excess.sum()) <= LEAST_NET * np.abs(excess).sum():
+            # Two kinks between two samples: their impulses cancel, and have no place.
+            return peak * step, 0.0
         place = float(excess @ (around - peak) / excess.sum())
     return (peak + place) * step, float(excess.sum() * step)

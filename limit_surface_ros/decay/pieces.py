@@ -196,7 +196,7 @@ class PiecewisePolynomial:
             Two arrays of shape (n,).
         """
         halves = 0.5 * np.diff(self.edges)
-        centres = 0.5 * (self.edges[1:] + self.edges[:-1])
+        starts = self.edges[:-1]
         value: Complexes = np.zeros(len(rates), dtype=np.complex128)
         slope: Complexes = np.zeros(len(rates), dtype=np.complex128)
         # Cells of one width share the wave inside the cell.
@@ -206,11 +206,13 @@ class PiecewisePolynomial:
             reach = float(np.abs(rates).max()) * half
             # A wave exp(-z v) on [-1, 1] needs about 0.7 |z| nodes, and then each a new digit.
             nodes, weights = gauss_legendre(int(0.75 * reach + 0.5 * self.degree) + 18)
-            waves = np.exp(np.multiply.outer(-half * rates, nodes))
-            shifts = np.exp(np.multiply.outer(-rates, centres[cells]))
+            # Counted from the cell's start: neither factor overflows where the product does not.
+            ages = half * (1.0 + nodes)
+            waves = np.exp(np.multiply.outer(-rates, ages))
+            shifts = np.exp(np.multiply.outer(-rates, starts[cells]))
             samples = legendre.legval(nodes, self.coefficients[cells].T) * weights * half
             inner = waves @ samples.T
-            moment = waves @ (samples * (half * nodes)).T + inner * centres[cells]
+            moment = waves @ (samples * ages).T + inner * starts[cells]
             value += (inner * shifts).sum(axis=1)
             slope -= (moment * shifts).sum(axis=1)
         return value, slope

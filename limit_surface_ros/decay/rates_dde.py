@@ -117,7 +117,7 @@ def _selections(system: DelaySystem, terms: int) -> list[tuple[str, Complexes]]:
     band = roots_in_box(
         system,
         (-30.0 / system.max_delay, float(first.real.max()) + 20.0 / system.max_delay),
-        (0.0, 2.0 * float(first.imag.max())),
+        (0.0, 2.0 * float(first.imag.max()) + 7.0 / system.max_delay),
     )
     slowest = band[np.argsort(-band.real, kind="stable")]
     return [("lowest frequency", first), ("slowest decay", slowest)]

@@ -7,6 +7,7 @@ eps < 0 those between. The best eps equals the error that is reached.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +23,7 @@ from limit_surface_ros.decay.rate_choice import (
 from limit_surface_ros.decay.response_fits import fit_response
 from limit_surface_ros.decay.smoothing import settling_time, smoothed
 from limit_surface_ros.decay.targets import largest_slope_jump
-from limit_surface_ros.errors import RangeError
+from limit_surface_ros.errors import RangeError, SolverError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 
 FIRST_LENGTHS = (1.05, 1.2, 1.4, 1.7)
 MOST_TRIALS = 30
+# However little the response decays on the interval, its model decays by this.
+LEAST_DECAY = 1e-3
 
 
 def neutral_roots(terms: int, damping: float, length: float) -> Complexes:
@@ -82,10 +85,14 @@ def neutral_rates(
 
     def rates_of(point: Floats) -> Complexes:
         damping, length = np.exp(point)
-        return np.append(tail, neutral_roots(free, float(damping), float(length)))
+        damping = max(float(damping), LEAST_DECAY / end)
+        return np.append(tail, neutral_roots(free, damping, float(length)))
 
     def error_of(point: Floats) -> float:
-        return fit_response(rates_of(point), response, end).max_error
+        try:
+            return fit_response(rates_of(point), response, end).max_error
+        except SolverError:
+            return math.inf
 
     jump = largest_slope_jump(smoothed(response, end))
     starts = []

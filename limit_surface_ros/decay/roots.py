@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 # Grid points for each distance 2 pi / T of neighbouring roots, at first and at most.
 FIRST_DENSITY, LAST_DENSITY = 4, 32
+MOST_POINTS = 200_000
 NEWTON_STEPS = 30
 # Edges that meet a root are moved outward by this part of the distance of roots, and again.
 NUDGES = (0.0, 0.05, 0.11, 0.23)
@@ -215,6 +216,10 @@ def _seeds(
     # Half a cell beyond the box: a root just inside its edge is then well inside a cell.
     columns = np.arange(real[0] - 0.5 * step, real[1] + step, step)
     rows = np.arange(imag[0] - 0.5 * step, imag[1] + step, step)
+    if len(columns) * len(rows) > MOST_POINTS:
+        raise SolverError(
+            f"the box Re {real}, Im {imag} is too large to search for roots {step:g} 1/s apart"
+        )
     grid = columns + 1j * rows[:, np.newaxis]
     # No root lies further out than the bound at its own real part, and h is much like lambda.
     reach = np.array([system.root_bound(x - step) for x in columns]) + step

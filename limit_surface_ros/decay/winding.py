@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 # Between two samples the phase may turn by this much [rad], and the modulus change by this factor.
 MOST_TURN, MOST_CHANGE = 0.7, 3.0
-MOST_SAMPLES = 400_000
+MOST_SAMPLES = 200_000
 
 
 def turn(function: Callable[[Complexes], Complexes], corners: Complexes, step: float) -> float:
@@ -38,6 +38,12 @@ def turn(function: Callable[[Complexes], Complexes], corners: Complexes, step: f
     Raises:
         SolverError: A zero lies on the path, or so close that it cannot be told.
     """
+    length = float(np.abs(np.diff(corners)).sum())
+    if length > 0.2 * MOST_SAMPLES * step:
+        raise SolverError(
+            f"a path of length {length:g} around the roots is too long to follow in steps of "
+            f"{step:g}: the system is too stiff for this box"
+        )
     legs = [
         np.linspace(start, end, max(2, int(np.ceil(abs(end - start) / step)) + 1))[:-1]
         for start, end in pairwise(corners)

@@ -1,5 +1,7 @@
 """Each method of choosing rates keeps its promise against the thesis and its peers."""
 
+import contextlib
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,7 +16,7 @@ from limit_surface_ros.decay.rates_neutral import neutral_rates, neutral_roots
 from limit_surface_ros.decay.response_fits import fit_response, largest_error
 from limit_surface_ros.decay.roots import first_roots
 from limit_surface_ros.decay.targets import PiecewiseLinear
-from limit_surface_ros.errors import RangeError, ShapeError, UnstableError
+from limit_surface_ros.errors import LimitSurfaceError, RangeError, ShapeError, UnstableError
 
 END = 19.0
 
@@ -131,3 +133,13 @@ def test_noise_does_not_make_the_fit_blow_up_beyond_the_interval(method):
 def test_bad_requests_are_refused_with_the_reason(call, error, message):
     with pytest.raises(error, match=message):
         call(examples.hockey_stick())
+
+
+@pytest.mark.parametrize("terms", [1, 5])
+@pytest.mark.parametrize("method", ["dde", "neutral", "esprit"])
+def test_a_response_that_nothing_suits_gives_a_fit_or_a_reason_but_no_warning(method, terms):
+    almost_a_step = PiecewiseLinear([0.0, 0.5, 0.5001, 5.0], [1.0, 1.0, 0.0, 0.0])
+    with contextlib.suppress(LimitSurfaceError):
+        result = fit_decay(almost_a_step, terms, 5.0, method)
+        assert result.fit.max_error < 1.0
+        assert result.fit.sum.slowest_rate < 0.0
