@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING
 
 from limit_surface_ros.checks import as_floats
 from limit_surface_ros.errors import RangeError
@@ -23,15 +23,14 @@ if TYPE_CHECKING:
     from limit_surface_ros.surface.pairs import Pairs
     from limit_surface_ros.surface.scaling import Scaling
 
-FittedOn = Literal["forces", "directions", "both"]
-FITTED_ON: tuple[str, ...] = get_args(FittedOn)
+FITTED_ON = ("forces", "directions", "both")
 
 
 def fit_dissipation(
     pairs: Pairs,
     terms: int,
     *,
-    fitted_on: FittedOn = "forces",
+    fitted_on: str = "forces",
     velocity_weight: float = 1.0,
     robust_scale: float | None = None,
     floor: float = 1e-3,

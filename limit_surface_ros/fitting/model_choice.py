@@ -2,8 +2,8 @@
 
 A careless choice loses more than it gains: with two dozen pushes the best of many recipes on
 held-out folds is often the luckiest. So there are few candidates, ordered by how much they are
-trusted beforehand, and a candidate displaces one before it only when it is better by more than the
-standard error of the difference over the same pushes.
+trusted beforehand, and a candidate displaces one before it only when it is better by more than two
+standard errors of the difference over the same pushes.
 """
 
 from __future__ import annotations
@@ -32,6 +32,10 @@ if TYPE_CHECKING:
 # gives.
 _MANY_PAIRS = 300
 MEMBERS = 8
+# Members of a mean while candidates are compared: enough to rank them, a third of the time.
+_MEMBERS_COMPARED = 3
+# Standard errors by which a candidate must be better than one that is trusted more.
+_MARGIN = 2.0
 
 
 def default_candidates(pairs: int, with_support: bool) -> list[Recipe]:
@@ -115,6 +119,7 @@ def choose_recipe(
     parts = np.array_split(np.random.default_rng(seed).permutation(count), min(folds, count))
     angles = np.full((len(recipes), count), np.inf)
     for row, recipe in enumerate(recipes):
+        compared = replace(recipe, members=min(recipe.members, _MEMBERS_COMPARED))
         for done, part in enumerate(parts):
             seen = np.setdiff1d(np.arange(count), part)
             held_out = Pairs(pairs.wrenches[part], pairs.twists[part])
@@ -122,7 +127,7 @@ def choose_recipe(
             try:
                 fit = fit_recipe(
                     training,
-                    recipe,
+                    compared,
                     scaling=scaling,
                     support=support,
                     seed=seed,
@@ -142,11 +147,11 @@ def choose_recipe(
 
 
 def _chosen(angles: Floats) -> int:
-    """Return the row that wins against those before it by more than the standard error."""
+    """Return the row that wins against those before it by a clear margin."""
     sound = np.flatnonzero(np.isfinite(angles).all(axis=1))
     chosen = int(sound[0])
     for row in sound[1:]:
         gains = angles[chosen] - angles[row]
-        if gains.mean() > gains.std(ddof=1) / np.sqrt(gains.size):
+        if gains.mean() > _MARGIN * gains.std(ddof=1) / np.sqrt(gains.size):
             chosen = int(row)
     return chosen

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 # Relative difference of cost within which two starts have found the same minimum.
 AGREEMENT = 1e-3
+PRECISION = 1e-10
 _MAX_ITERATIONS = 2000
 # Pairs of steps that L-BFGS remembers: about the number of parameters, so that it is BFGS in all
 # but name and a step costs next to nothing.
@@ -84,8 +85,14 @@ class Descent:
     converged: bool
 
 
-def descend(objective: Objective, start: Floats) -> Descent:
-    """Minimise by BFGS with limited memory from `start`."""
+def descend(objective: Objective, start: Floats, precision: float = PRECISION) -> Descent:
+    """Minimise by BFGS with limited memory from `start`.
+
+    Args:
+        objective: What to minimise.
+        start: Shape (size,).
+        precision: Relative gain of a step below which it is the last.
+    """
     found = minimize(
         objective.cost_and_gradient,
         start,
@@ -95,7 +102,7 @@ def descend(objective: Objective, start: Floats) -> Descent:
             "maxcor": _MEMORY,
             "maxiter": _MAX_ITERATIONS,
             "maxfun": 2 * _MAX_ITERATIONS,
-            "ftol": 1e-10,
+            "ftol": precision,
             "gtol": 1e-8,
         },
     )
@@ -109,9 +116,11 @@ def descend(objective: Objective, start: Floats) -> Descent:
     )
 
 
-def descend_from_seed(objective: Objective, seed: int, index: int) -> Descent:
+def descend_from_seed(
+    objective: Objective, seed: int, index: int, precision: float = PRECISION
+) -> Descent:
     """Minimise from start number `index` of `seed`."""
-    return descend(objective, objective.start(np.random.default_rng([seed, index])))
+    return descend(objective, objective.start(np.random.default_rng([seed, index])), precision)
 
 
 def descents(objective: Objective, search: Search) -> list[Descent]:

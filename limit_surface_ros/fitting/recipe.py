@@ -49,6 +49,8 @@ FEWEST_PAIRS = 6
 _FLOOR = 1e-3
 # Pairs that stand for the ellipsoid.
 _ELLIPSOID_PAIRS = 40
+# Noisy pushes do not tell closer minima apart.
+_PRECISION = 1e-6
 
 
 @dataclass(frozen=True)
@@ -144,7 +146,7 @@ def fit_recipe(
     scaled = scale_pairs(pairs, scaling)
     check_support(scaled, FEWEST_PAIRS)
     tasks = [
-        (_objective(scaled.weighted(weights), recipe, support), seed, index)
+        (_objective(scaled.weighted(weights), recipe, support), seed, index, _PRECISION)
         for index, weights in enumerate(_weights(len(scaled), recipe.members, seed))
     ]
     if executor is None:

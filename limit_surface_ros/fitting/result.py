@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from limit_surface_ros.surface.measures import mean_angle, quantiles, velocity_error
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.surface.pairs import Pairs
     from limit_surface_ros.surface.protocol import LimitSurface
@@ -60,6 +62,7 @@ class FitResult:
         wall_time: Time the fit took [s].
         training: Errors on the pairs that were fitted.
         held_out: Errors on pairs that were not, if there are any.
+        details: What else there is to say, plain values.
     """
 
     surface: LimitSurface
@@ -72,6 +75,7 @@ class FitResult:
     wall_time: float
     training: Errors
     held_out: Errors | None = None
+    details: Mapping[str, Any] = field(default_factory=dict)
 
     def tested_on(self, pairs: Pairs) -> FitResult:
         """Return the result with errors on held-out pairs."""
@@ -91,4 +95,4 @@ class FitResult:
         }
         if self.held_out is not None:
             values["held_out"] = self.held_out.summary()
-        return values
+        return values | dict(self.details)

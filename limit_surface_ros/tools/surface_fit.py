@@ -10,16 +10,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from limit_surface_ros import __version__
-from limit_surface_ros.errors import RangeError
+from limit_surface_ros.errors import DataError, RangeError
 from limit_surface_ros.files.surface_file import SurfaceModel
+from limit_surface_ros.fitting.automatic import fit_automatically
+from limit_surface_ros.fitting.dissipation import FITTED_ON, fit_dissipation
 from limit_surface_ros.fitting.multi_start import Search
 from limit_surface_ros.fitting.power_sum import fit_power_sum
 from limit_surface_ros.fitting.scaled_pairs import scaling_of_pairs
 from limit_surface_ros.surface.power_sum import thesis_exponents
 from limit_surface_ros.tools.training_data import (
     ACCEPTED,
+    Simulation,
     check_input,
     row_numbers,
+    training_data_of_contact,
     training_data_of_pushes,
 )
 
@@ -28,8 +32,10 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
     from pathlib import Path
 
+    from limit_surface_ros.checks import Floats
     from limit_surface_ros.fitting.multi_start import Progress
     from limit_surface_ros.fitting.result import FitResult
+    from limit_surface_ros.surface.point_contacts import PointContacts
     from limit_surface_ros.tools.training_data import TrainingData
 
 
@@ -44,8 +50,58 @@ class FittedModel:
 def add_fit_options(parser: argparse.ArgumentParser) -> None:
     """Declare every option on which the fitted model depends, but for its name."""
     parser.add_argument("--frame-id", default="object", help="the model's frame (%(default)s)")
+    _add_data_options(parser.add_argument_group("data"))
 
-    data = parser.add_argument_group("data")
+    fit = parser.add_argument_group("fit")
+    fit.add_argument("--kind", choices=["power_sum", "dissipation"], default="power_sum")
+    fit.add_argument("--terms", type=int, default=3, help="terms of the model (%(default)s)")
+    fit.add_argument(
+        "--family",
+        choices=["thesis", "norms"],
+        default="thesis",
+        help="exponents of a power_sum: 1, (n-1)/n, ..., 1/n, or 1/2 for every term, which is "
+        "always convex (%(default)s)",
+    )
+    fit.add_argument(
+        "--objective",
+        choices=["J1", "J2", *FITTED_ON],
+        help="of a power_sum: J1 fits loads, J2 loads and motions (default J2); of a dissipation: "
+        "forces, directions or both (default forces for contacts, directions for pushes)",
+    )
+    fit.add_argument(
+        "--velocity-weight",
+        type=float,
+        default=1.0,
+        metavar="W",
+        help="weight of the motions, in all but J1 and forces (%(default)s)",
+    )
+    fit.add_argument("--starts", type=int, default=8, help="random starts at most (%(default)s)")
+    fit.add_argument("--seed", type=int, default=0, help="of all that is random (%(default)s)")
+
+    few = parser.add_argument_group("few, noisy pushes")
+    few.add_argument(
+        "--auto",
+        action="store_true",
+        help="choose kind, terms, weight and what the fit is held towards by cross-validation, "
+        "and average several fits; leaves the options above aside",
+    )
+    few.add_argument("--folds", type=int, default=5, help="of the cross-validation (%(default)s)")
+    few.add_argument(
+        "--support",
+        action="store_true",
+        help="let --auto use the support points that the pushes' first line states",
+    )
+    few.add_argument(
+        "--bootstrap",
+        type=int,
+        default=0,
+        metavar="N",
+        help="refit N times with random weights of the pushes and store the surfaces, whose "
+        "spread shows how sure a predicted twist is (with --auto)",
+    )
+
+
+def _add_data_options(data: argparse._ArgumentGroup) -> None:
     data.add_argument(
         "--rows", help="rows of a CSV to fit, such as 0,3,10-14; others are held out"
     )
@@ -56,31 +112,23 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
         help="makes moments and rotations comparable [m]; default: what the data state, or the "
         "ratio of moments to forces in them",
     )
-
-    fit = parser.add_argument_group("fit")
-    fit.add_argument("--terms", type=int, default=3, help="terms of the model (%(default)s)")
-    fit.add_argument(
-        "--family",
-        choices=["thesis", "norms"],
-        default="thesis",
-        help="exponents 1, (n-1)/n, ..., 1/n, or 1/2 for every term, which is always convex "
-        "(%(default)s)",
+    data.add_argument(
+        "--motions", type=int, default=2000, help="random motions of a contact (%(default)s)"
     )
-    fit.add_argument(
-        "--objective",
-        choices=["J1", "J2"],
-        default="J2",
-        help="J1 fits loads, J2 loads and motions (%(default)s)",
+    data.add_argument(
+        "--facet-loads",
+        type=int,
+        default=150,
+        help="loads on each facet of a contact of a few points (%(default)s)",
     )
-    fit.add_argument(
-        "--velocity-weight",
-        type=float,
-        default=1.0,
-        metavar="W",
-        help="weight of the motions in J2 (%(default)s)",
-    )
-    fit.add_argument("--starts", type=int, default=8, help="random starts at most (%(default)s)")
-    fit.add_argument("--seed", type=int, default=0, help="of all that is random (%(default)s)")
+    for what, of in (("load", "the root mean square load"), ("motion", "a unit motion")):
+        data.add_argument(
+            f"--{what}-noise",
+            type=float,
+            default=0.0,
+            metavar="S",
+            help=f"noise added to a contact's {what}s, in parts of {of} (%(default)s)",
+        )
 
 
 def available_cores() -> int:
@@ -116,6 +164,7 @@ def fit_model(
         name=name,
         surface=result.surface,
         frame_id=options.frame_id,
+        reference_point=data.reference_point,
         normal_force=data.normal_force,
         fit=history(options, data, result),
     )
@@ -128,25 +177,76 @@ def read_input(path: Path, options: argparse.Namespace) -> TrainingData:
     rows = None if options.rows is None else row_numbers(options.rows)
     if suffix == ".csv":
         return training_data_of_pushes(path, rows)
+    if suffix in (".yaml", ".yml"):
+        simulation = Simulation(
+            options.motions,
+            options.facet_loads,
+            options.load_noise,
+            options.motion_noise,
+            options.seed,
+        )
+        return training_data_of_contact(path, simulation, options.characteristic_length)
     raise RangeError(f"{path}: {suffix or 'no suffix'} is not known; accepted is {ACCEPTED}")
 
 
 def fit(options: argparse.Namespace, data: TrainingData, search: Search) -> FitResult:
     """Fit what the options ask for."""
-    exponents = (
-        thesis_exponents(options.terms)
-        if options.family == "thesis"
-        else np.full(max(options.terms, 0), 0.5)
-    )
     length = options.characteristic_length or data.characteristic_length
-    result = fit_power_sum(
-        data.training,
-        exponents,
-        velocity_weight=0.0 if options.objective == "J1" else options.velocity_weight,
-        scaling=scaling_of_pairs(data.training, length),
-        search=search,
-    )
+    scaling = scaling_of_pairs(data.training, length)
+    if options.auto:
+        result = fit_automatically(
+            data.training,
+            scaling=scaling,
+            support=support_of(options, data),
+            folds=options.folds,
+            refits=options.bootstrap,
+            search=search,
+        )
+    elif options.bootstrap:
+        raise RangeError("--bootstrap refits what --auto has chosen: give both")
+    elif options.kind == "dissipation":
+        default = "directions" if data.recorded else "forces"
+        result = fit_dissipation(
+            data.training,
+            options.terms,
+            fitted_on=options.objective or default,
+            velocity_weight=options.velocity_weight,
+            scaling=scaling,
+            search=search,
+        )
+    else:
+        result = fit_power_sum(
+            data.training,
+            exponents_of(options),
+            velocity_weight=power_sum_weight(options),
+            scaling=scaling,
+            search=search,
+        )
     return result if data.held_out is None else result.tested_on(data.held_out)
+
+
+def exponents_of(options: argparse.Namespace) -> Floats:
+    """Return the exponents of the power sum that the options ask for."""
+    if options.family == "thesis":
+        return thesis_exponents(options.terms)
+    return np.full(max(options.terms, 0), 0.5)
+
+
+def power_sum_weight(options: argparse.Namespace) -> float:
+    """Return the velocity weight of a power sum: none for J1."""
+    if options.objective in FITTED_ON:
+        raise RangeError(
+            f"--objective {options.objective} is for --kind dissipation; "
+            "a power_sum takes J1 or J2"
+        )
+    return 0.0 if options.objective == "J1" else float(options.velocity_weight)
+
+
+def support_of(options: argparse.Namespace, data: TrainingData) -> PointContacts | None:
+    """Return the support points that a prior is made of, if the options ask for one."""
+    if options.support and data.support is None:
+        raise DataError("--support: the input states no support points with their loads")
+    return data.support if options.support else None
 
 
 def history(options: argparse.Namespace, data: TrainingData, result: FitResult) -> dict[str, Any]:

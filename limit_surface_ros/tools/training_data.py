@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from limit_surface_ros.errors import DataError, FileError
+from limit_surface_ros.files.contact_file import read_contact
 from limit_surface_ros.files.pushes_csv import read_pushes
+from limit_surface_ros.fitting.simulation import simulated_pairs
+from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.sampling import random_motions
+from limit_surface_ros.surface.scaling import Scaling
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from limit_surface_ros.surface.pairs import Pairs
-    from limit_surface_ros.surface.protocol import LimitSurface
 
 SUFFIXES = (".yaml", ".yml", ".csv")
 ACCEPTED = "a contact file (.yaml, .yml) or recorded pushes (.csv)"
@@ -27,18 +31,20 @@ class TrainingData:
         training: What the fit sees.
         held_out: What it does not, if there is any.
         characteristic_length: [m], if the source states it.
-        exact: The surface that made the pairs, if they are simulated.
-        prior: The surface of support points that the source states, if it does.
+        support: Support points that the source states, if it does.
         normal_force: [N], if the source states it.
+        reference_point: Of the contact that was simulated [m].
+        recorded: Whether the pairs were measured and not simulated.
         about: For the model file.
     """
 
     training: Pairs
     held_out: Pairs | None = None
     characteristic_length: float | None = None
-    exact: LimitSurface | None = None
-    prior: LimitSurface | None = None
+    support: PointContacts | None = None
     normal_force: float | None = None
+    reference_point: tuple[float, float] = (0.0, 0.0)
+    recorded: bool = False
     about: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -68,12 +74,55 @@ def training_data_of_pushes(path: Path, rows: list[int] | None) -> TrainingData:
     pushes = read_pushes(path)
     training = pushes.pairs if rows is None else pushes.rows(rows)
     others = len(pushes.pairs) - len(training)
+    support = pushes.support()
     return TrainingData(
         training=training,
+        support=None if support is None else PointContacts(*support),
         held_out=pushes.rest(rows) if rows is not None and others else None,
         characteristic_length=pushes.number("rho_m"),
         normal_force=pushes.number("normal_force_N"),
+        recorded=True,
         about={"data": path.name, "rows": "all" if rows is None else rows},
+    )
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """How pairs are made from a contact; see `fitting.simulation`."""
+
+    motions: int = 2000
+    per_facet: int = 150
+    load_noise: float = 0.0
+    motion_noise: float = 0.0
+    seed: int = 0
+
+
+def training_data_of_contact(
+    path: Path, simulation: Simulation, characteristic_length: float | None
+) -> TrainingData:
+    """Make pairs from a contact file, and as many fresh motions without noise to test on."""
+    contact = read_contact(path)
+    exact = contact.surface
+    if characteristic_length is not None:
+        scaling = Scaling(characteristic_length, exact.scaling.friction_force)
+        exact = PointContacts(exact.points, exact.friction_limits, scaling)
+    training = simulated_pairs(
+        exact,
+        simulation.motions,
+        simulation.per_facet,
+        load_noise=simulation.load_noise,
+        motion_noise=simulation.motion_noise,
+        seed=simulation.seed,
+    )
+    x, y = (float(component) for component in contact.reference_point)
+    return TrainingData(
+        training=training,
+        held_out=random_motions(exact, simulation.motions, simulation.seed + 1),
+        characteristic_length=exact.scaling.characteristic_length,
+        support=exact,
+        normal_force=contact.normal_force,
+        reference_point=(x, y),
+        about={"data": path.name, **asdict(simulation)},
     )
 
 

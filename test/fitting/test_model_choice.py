@@ -5,6 +5,12 @@ import pytest
 
 from limit_surface_ros.errors import DataError, RangeError, ShapeError
 from limit_surface_ros.fitting.averaging import mean_surface
+from limit_surface_ros.fitting.bootstrap import (
+    bootstrap,
+    stored_surfaces,
+    surfaces_of,
+    twist_spread,
+)
 from limit_surface_ros.fitting.model_choice import choose_recipe, default_candidates
 from limit_surface_ros.fitting.recipe import Recipe, fit_recipe
 from limit_surface_ros.surface.dissipation import Dissipation
@@ -84,19 +90,39 @@ def test_averaging_helps_with_few_noisy_pushes():
 
 
 def test_the_choice_predicts_better_than_an_ellipsoid_and_is_refitted_on_all():
-    pushes, test = noisy_pushes(24), random_loads(TRIANGLE, 300, 9)
+    pushes, test = noisy_pushes(80), random_loads(TRIANGLE, 300, 9)
     candidates = [Recipe("power_sum", 1), Recipe(members=3, towards="ellipsoid")]
     seen = []
     choice = choose_recipe(
         pushes, candidates=candidates, progress=lambda done, total: seen.append((done, total))
     )
     assert choice.recipe is candidates[1]
-    assert choice.angles.shape == (2, 24)
+    assert choice.angles.shape == (2, 80)
     assert seen[-1] == (10, 10)
     again = fit_recipe(pushes, choice.recipe).surface
     np.testing.assert_array_equal(again.matrices, choice.fit.surface.matrices)
     ellipsoid = fit_recipe(pushes, candidates[0]).surface
     assert mean_angle(choice.fit.surface, test) < mean_angle(ellipsoid, test)
+
+
+def test_a_recipe_that_is_trusted_more_is_not_displaced_by_a_lucky_one():
+    pushes = noisy_pushes(16)
+    twins = [Recipe("power_sum", 2), Recipe("power_sum", 2, strength=3.0)]
+    assert choose_recipe(pushes, candidates=twins).recipe is twins[0]
+
+
+def test_a_bootstrap_is_surer_with_more_pushes_and_outlives_its_file():
+    load = random_loads(TRIANGLE, 40, 5).wrenches
+    recipe = Recipe(terms=2)
+    few, many = (bootstrap(noisy_pushes(count), recipe, 5) for count in (15, 120))
+    assert twist_spread(many, load).mean() < twist_spread(few, load).mean()
+    again = surfaces_of(stored_surfaces(few), few[0].scaling)
+    np.testing.assert_array_equal(twist_spread(again, load), twist_spread(few, load))
+    assert twist_spread(few, load[0]).shape == ()
+    with pytest.raises(DataError, match="holds no surfaces"):
+        surfaces_of({"kind": "dissipation"}, few[0].scaling)
+    with pytest.raises(RangeError, match="at least 2 refits"):
+        bootstrap(noisy_pushes(15), recipe, 1)
 
 
 def test_known_support_points_enter_the_candidates_first():

@@ -8,6 +8,7 @@ import pytest
 
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.files.surface_file import read_surface_model
+from limit_surface_ros.fitting.bootstrap import surfaces_of
 from limit_surface_ros.surface.measures import mean_angle
 from limit_surface_ros.surface.point_contacts import PointContacts
 from limit_surface_ros.surface.sampling import random_motions
@@ -64,6 +65,64 @@ def test_bad_data_give_one_line_and_no_file(pushes, tmp_path, capsys, change, me
     printed = capsys.readouterr().err
     assert message in printed
     assert len(printed.splitlines()) == 1
+    assert not output.exists()
+
+
+CONTACT = """schema: 1
+name: triangle
+points: [[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]]
+friction_limits: [0.5, 0.5, 0.5]
+"""
+
+
+@pytest.mark.parametrize(
+    ("options", "kind", "most_degrees"),
+    [
+        (["--terms", "2", "--characteristic-length", "0.15"], "power_sum", 6.0),
+        (["--family", "norms", "--objective", "J1"], "power_sum", 9.0),
+        (["--kind", "dissipation"], "dissipation", 0.5),
+        (["--kind", "dissipation", "--load-noise", "0.05", "--terms", "2"], "dissipation", 9.0),
+    ],
+)
+def test_a_contact_is_simulated_and_fitted(tmp_path, options, kind, most_degrees):
+    contact, output = tmp_path / "contact.yaml", tmp_path / "model.yaml"
+    contact.write_text(CONTACT)
+    few = ["--motions", "400", "--facet-loads", "20"]
+    assert main([str(contact), "-o", str(output), *few, *options]) == 0
+    model = read_surface_model(output)
+    assert model.surface.kind == kind
+    assert model.fit["motions"] == 400
+    test = random_motions(TRIANGLE, 500, 1)
+    assert np.degrees(mean_angle(model.surface, test)) < most_degrees
+
+
+def test_the_automatic_fit_stores_its_choice_and_its_bootstrap(pushes, tmp_path):
+    output = tmp_path / "model.yaml"
+    arguments = [str(pushes), "-o", str(output), "--auto", "--bootstrap", "3", "--rows", "0-15"]
+    assert main([*arguments, "--folds", "2"]) == 0
+    model = read_surface_model(output)
+    assert len(model.fit["cross_validation_mean_angle_deg"]) >= 5
+    assert len(surfaces_of(model.fit["bootstrap"], model.surface.scaling)) == 3
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--objective", "forces"], "--objective forces is for --kind dissipation"),
+        (["--kind", "dissipation", "--objective", "J2"], "fitted_on must be one of"),
+        (["--bootstrap", "5"], "give both"),
+        (["--auto", "--support"], "states no support points"),
+        (["--terms", "0"], "terms must be at least 1"),
+        (["--starts", "0"], "starts must be at least 1"),
+        (["--velocity-weight", "-1"], "velocity_weight must not be negative"),
+        (["--rows", "1-x"], "rows must be like"),
+        (["--rows", "70"], "there is no row 70"),
+    ],
+)
+def test_options_that_do_not_fit_together_are_refused(pushes, tmp_path, capsys, options, message):
+    output = tmp_path / "model.yaml"
+    assert main([str(pushes), "-o", str(output), *options]) == 2
+    assert message in capsys.readouterr().err
     assert not output.exists()
 
 

@@ -1,0 +1,86 @@
+"""The fit that asks for no choice: a recipe by cross-validation, refitted on all pushes."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from limit_surface_ros.fitting.bootstrap import bootstrap, stored_surfaces
+from limit_surface_ros.fitting.model_choice import choose_recipe
+from limit_surface_ros.fitting.multi_start import Search
+from limit_surface_ros.fitting.result import FitResult, errors_on
+
+if TYPE_CHECKING:
+    from limit_surface_ros.surface.pairs import Pairs
+    from limit_surface_ros.surface.point_contacts import PointContacts
+    from limit_surface_ros.surface.scaling import Scaling
+
+
+def fit_automatically(
+    pairs: Pairs,
+    *,
+    scaling: Scaling | None = None,
+    support: PointContacts | None = None,
+    folds: int = 5,
+    refits: int = 0,
+    search: Search | None = None,
+) -> FitResult:
+    """Choose a recipe by cross-validation, refit it on all pushes, and say what was chosen.
+
+    Args:
+        pairs: Recorded pushes.
+        scaling: Characteristic length and friction force; chosen from the pairs if not given.
+        support: Known support points, if there are any.
+        folds: Of the cross-validation.
+        refits: Of a bootstrap whose surfaces go into the result's details; 0 for none.
+        search: Seed, where to run, and progress; each member of a mean is one start.
+
+    Raises:
+        DataError: The pushes cannot determine a surface.
+        RangeError: There are fewer than two folds, or one refit.
+    """
+    search = search or Search()
+    begin = time.perf_counter()
+    choice = choose_recipe(
+        pairs,
+        folds=folds,
+        scaling=scaling,
+        support=support,
+        seed=search.seed,
+        executor=search.executor,
+        progress=search.progress,
+    )
+    costs = [descent.cost for descent in choice.fit.descents]
+    best = choice.fit.descents[int(np.argmin(costs))]
+    details: dict[str, Any] = {
+        "cross_validation_mean_angle_deg": {
+            str(recipe): round(float(np.degrees(angle)), 3)
+            for recipe, angle in zip(choice.candidates, choice.angles.mean(axis=1), strict=True)
+            if np.isfinite(angle)
+        }
+    }
+    if refits:
+        surfaces = bootstrap(
+            pairs,
+            choice.recipe,
+            refits,
+            scaling=choice.fit.surface.scaling,
+            support=support,
+            seed=search.seed,
+            executor=search.executor,
+        )
+        details["bootstrap"] = stored_surfaces(surfaces)
+    return FitResult(
+        surface=choice.fit.surface,
+        objective=str(choice.recipe),
+        cost=float(np.mean(costs)),
+        start_costs=tuple(sorted(costs)),
+        iterations=best.iterations,
+        gradient_norm=best.gradient_norm,
+        converged=all(descent.converged for descent in choice.fit.descents),
+        wall_time=time.perf_counter() - begin,
+        training=errors_on(choice.fit.surface, pairs),
+        details=details,
+    )

@@ -1,0 +1,123 @@
+"""How far recorded pushes leave a predicted twist open: refits with random weights of the pushes.
+
+The Bayesian bootstrap (Rubin 1981, doi:10.1214/aos/1176345338) draws each push's weight from an
+exponential distribution. The surfaces of many such refits spread as the data allow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from limit_surface_ros.checks import as_floats
+from limit_surface_ros.errors import DataError, RangeError
+from limit_surface_ros.fitting.recipe import Recipe, fit_recipe
+from limit_surface_ros.surface.dissipation import Dissipation
+from limit_surface_ros.surface.power_sum import PowerSum
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from concurrent.futures import Executor
+
+    from numpy.typing import ArrayLike
+
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.pairs import Pairs
+    from limit_surface_ros.surface.point_contacts import PointContacts
+    from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.surface.scaling import Scaling
+
+
+def bootstrap(
+    pairs: Pairs,
+    recipe: Recipe,
+    count: int,
+    *,
+    scaling: Scaling | None = None,
+    support: PointContacts | None = None,
+    seed: int = 0,
+    executor: Executor | None = None,
+) -> tuple[LimitSurface, ...]:
+    """Return the surfaces of `count` refits by one recipe.
+
+    Args:
+        pairs: Recorded pushes.
+        recipe: How to fit; its own number of members does not matter.
+        count: How many refits, at least 2.
+        scaling: Characteristic length and friction force; chosen from the pairs if not given.
+        support: Known support points, for recipes held towards them.
+        seed: Of weights and starts.
+        executor: Where refits run; here and one by one if not given.
+
+    Raises:
+        RangeError: `count` is below 2.
+        DataError: The pushes cannot determine a surface.
+    """
+    if count < 2:
+        raise RangeError(f"a bootstrap needs at least 2 refits, got {count}")
+    fit = fit_recipe(
+        pairs,
+        replace(recipe, members=count),
+        scaling=scaling,
+        support=support,
+        # Apart from the seed of the fit itself, whose members are drawn in the same way.
+        seed=seed + 1,
+        executor=executor,
+    )
+    return fit.members
+
+
+def twist_spread(surfaces: Sequence[LimitSurface], wrench: ArrayLike) -> Floats:
+    """Return how far the surfaces' twists lie from their mean, root mean square [rad].
+
+    Args:
+        surfaces: At least 2, of one scaling.
+        wrench: Shape (..., 3), (fx, fy, tau_z) in [N, N, N m].
+
+    Returns:
+        Shape (...), angles in scaled variables.
+
+    Raises:
+        DataError: There are fewer than 2 surfaces.
+    """
+    if len(surfaces) < 2:
+        raise DataError(f"a spread needs at least 2 surfaces, got {len(surfaces)}")
+    unit = surfaces[0].scaling.twist_unit
+    twists = np.array([surface.twist_of_wrench(wrench) for surface in surfaces]) / unit
+    mean = twists.mean(axis=0)
+    mean /= np.linalg.norm(mean, axis=-1, keepdims=True)
+    angles = 2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(twists - mean, axis=-1), 1.0))
+    return np.asarray(np.sqrt(np.mean(angles**2, axis=0)))
+
+
+def stored_surfaces(surfaces: Sequence[LimitSurface]) -> dict[str, Any]:
+    """Return the surfaces of a bootstrap as plain values for a model file."""
+    first = surfaces[0]
+    values: dict[str, Any] = {"kind": first.kind, "matrices": []}
+    if isinstance(first, PowerSum):
+        values["exponents"] = first.exponents.tolist()
+    for surface in surfaces:
+        assert isinstance(surface, (PowerSum, Dissipation))
+        values["matrices"].append(surface.matrices.tolist())
+    return values
+
+
+def surfaces_of(stored: Mapping[str, Any], scaling: Scaling) -> tuple[LimitSurface, ...]:
+    """Return the surfaces that `stored_surfaces` put into a model file's `fit: bootstrap`.
+
+    Args:
+        stored: What stands there.
+        scaling: The model's.
+
+    Raises:
+        DataError: It is not what `stored_surfaces` makes.
+    """
+    try:
+        matrices = as_floats("matrices", stored["matrices"])
+        if stored["kind"] == PowerSum.kind:
+            return tuple(PowerSum(each, stored["exponents"], scaling) for each in matrices)
+        return tuple(Dissipation(each, scaling) for each in matrices)
+    except (KeyError, TypeError, ValueError) as error:
+        raise DataError(f"fit: bootstrap holds no surfaces: {error}") from None
