@@ -46,15 +46,17 @@ class Search:
         executor: Where starts run; here and one by one if not given. `process_pool` makes one, a
             dask client's `get_executor()` is another.
         progress: Called with (starts done, starts at most) after each.
+        stop_early: Whether half of them that agree on the best are enough.
 
     Raises:
         RangeError: There is no start, or the seed is negative.
     """
 
-    starts: int = 8
+    starts: int = 16
     seed: int = 0
     executor: Executor | None = None
     progress: Progress | None = None
+    stop_early: bool = True
 
     def __post_init__(self) -> None:
         """Check the counts."""
@@ -132,7 +134,7 @@ def descents(objective: Objective, search: Search) -> list[Descent]:
     Raises:
         SolverError: No start led to a finite cost.
     """
-    enough = max(2, math.ceil(search.starts / 2))
+    enough = max(2, math.ceil(search.starts / 2)) if search.stop_early else search.starts
     done: list[Descent] = []
     for descent in _in_order(objective, search):
         done.append(descent)

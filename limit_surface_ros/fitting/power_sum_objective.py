@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 # Keeps powers and logarithms of a quadratic form finite where a matrix has lost the load's
 # direction; in scaled variables it is far below anything that a fit can see.
 _TINY = 1e-100
+# Logarithmic spread of the axes of random terms.
+_START_SPREAD = 1.5
 
 
 class PowerSumObjective:
@@ -136,6 +138,8 @@ class PowerSumObjective:
         factors = np.linalg.cholesky(
             matrices + 1e-9 * np.trace(matrices, axis1=1, axis2=2)[:, None, None] * np.eye(3)
         )
+        # Terms of very different shape: starts of like terms miss the deepest minima.
+        factors *= np.exp(_START_SPREAD * rng.normal(size=(self._exponents.size, 3, 1)))
         self._evaluate(matrices_of(factors))
         scale: Floats = self._values.mean(axis=1) * self._exponents.size
         return parameters_of(factors * (scale ** (-0.5 / self._exponents))[:, None, None])

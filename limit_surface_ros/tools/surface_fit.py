@@ -15,8 +15,10 @@ from limit_surface_ros.files.surface_file import SurfaceModel
 from limit_surface_ros.fitting.automatic import fit_automatically
 from limit_surface_ros.fitting.dissipation import FITTED_ON, fit_dissipation
 from limit_surface_ros.fitting.multi_start import Search
+from limit_surface_ros.fitting.polynomial import fit_polynomial
 from limit_surface_ros.fitting.power_sum import fit_power_sum
 from limit_surface_ros.fitting.scaled_pairs import scaling_of_pairs
+from limit_surface_ros.fitting.second_approximation import fit_second_approximation
 from limit_surface_ros.surface.power_sum import thesis_exponents
 from limit_surface_ros.tools.training_data import (
     ACCEPTED,
@@ -36,7 +38,16 @@ if TYPE_CHECKING:
     from limit_surface_ros.fitting.multi_start import Progress
     from limit_surface_ros.fitting.result import FitResult
     from limit_surface_ros.surface.point_contacts import PointContacts
+    from limit_surface_ros.surface.scaling import Scaling
     from limit_surface_ros.tools.training_data import TrainingData
+
+
+# What each kind can be fitted by, the default first.
+OBJECTIVES: dict[str, tuple[str, ...]] = {
+    "power_sum": ("J2", "J1", "second"),
+    "dissipation": FITTED_ON,
+    "polynomial": ("least-squares", "convex"),
+}
 
 
 @dataclass(frozen=True)
@@ -53,7 +64,12 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
     _add_data_options(parser.add_argument_group("data"))
 
     fit = parser.add_argument_group("fit")
-    fit.add_argument("--kind", choices=["power_sum", "dissipation"], default="power_sum")
+    fit.add_argument(
+        "--kind",
+        choices=["power_sum", "dissipation", "polynomial"],
+        default="power_sum",
+        help="of surface; a polynomial is of fourth order (%(default)s)",
+    )
     fit.add_argument("--terms", type=int, default=3, help="terms of the model (%(default)s)")
     fit.add_argument(
         "--family",
@@ -64,9 +80,11 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
     )
     fit.add_argument(
         "--objective",
-        choices=["J1", "J2", *FITTED_ON],
-        help="of a power_sum: J1 fits loads, J2 loads and motions (default J2); of a dissipation: "
-        "forces, directions or both (default forces for contacts, directions for pushes)",
+        choices=[*OBJECTIVES["power_sum"], *FITTED_ON, *OBJECTIVES["polynomial"]],
+        help="of a power_sum: J1 fits loads, J2 loads and motions, second is J2 of two terms with "
+        "one by least squares inside (default J2); of a dissipation: forces, directions or both "
+        "(default forces for contacts, directions for pushes); of a polynomial: least-squares on "
+        "loads, or convex on loads and motions (default least-squares)",
     )
     fit.add_argument(
         "--velocity-weight",
@@ -75,7 +93,7 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
         metavar="W",
         help="weight of the motions, in all but J1 and forces (%(default)s)",
     )
-    fit.add_argument("--starts", type=int, default=8, help="random starts at most (%(default)s)")
+    fit.add_argument("--starts", type=int, default=16, help="random starts at most (%(default)s)")
     fit.add_argument("--seed", type=int, default=0, help="of all that is random (%(default)s)")
 
     few = parser.add_argument_group("few, noisy pushes")
@@ -202,27 +220,62 @@ def fit(options: argparse.Namespace, data: TrainingData, search: Search) -> FitR
             refits=options.bootstrap,
             search=search,
         )
-    elif options.bootstrap:
-        raise RangeError("--bootstrap refits what --auto has chosen: give both")
-    elif options.kind == "dissipation":
-        default = "directions" if data.recorded else "forces"
-        result = fit_dissipation(
-            data.training,
-            options.terms,
-            fitted_on=options.objective or default,
-            velocity_weight=options.velocity_weight,
-            scaling=scaling,
-            search=search,
-        )
     else:
-        result = fit_power_sum(
-            data.training,
-            exponents_of(options),
-            velocity_weight=power_sum_weight(options),
+        result = fit_as_told(options, data, scaling, search)
+    return result if data.held_out is None else result.tested_on(data.held_out)
+
+
+def fit_as_told(
+    options: argparse.Namespace, data: TrainingData, scaling: Scaling, search: Search
+) -> FitResult:
+    """Fit the kind and the objective that the options name."""
+    if options.bootstrap:
+        raise RangeError("--bootstrap refits what --auto has chosen: give both")
+    objective, weight = objective_of(options, data), float(options.velocity_weight)
+    pairs = data.training
+    if options.kind == "polynomial":
+        convex = objective == "convex"
+        return fit_polynomial(
+            pairs, velocity_weight=weight if convex else 0.0, convex=convex, scaling=scaling
+        )
+    if options.kind == "dissipation":
+        return fit_dissipation(
+            pairs,
+            options.terms,
+            fitted_on=objective,
+            velocity_weight=weight,
             scaling=scaling,
             search=search,
         )
-    return result if data.held_out is None else result.tested_on(data.held_out)
+    if objective == "second":
+        return fit_second_approximation(
+            pairs, velocity_weight=weight, scaling=scaling, search=search
+        )
+    return fit_power_sum(
+        pairs,
+        exponents_of(options),
+        velocity_weight=0.0 if objective == "J1" else weight,
+        scaling=scaling,
+        search=search,
+    )
+
+
+def objective_of(options: argparse.Namespace, data: TrainingData) -> str:
+    """Return the objective, by default the first of the kind's.
+
+    Raises:
+        RangeError: The objective is none of the kind's.
+    """
+    accepted = OBJECTIVES[options.kind]
+    if options.objective is None:
+        on_pushes = options.kind == "dissipation" and data.recorded
+        return "directions" if on_pushes else accepted[0]
+    if options.objective not in accepted:
+        raise RangeError(
+            f"--objective {options.objective} is not for --kind {options.kind}, "
+            f"which takes {', '.join(accepted)}"
+        )
+    return str(options.objective)
 
 
 def exponents_of(options: argparse.Namespace) -> Floats:
@@ -230,16 +283,6 @@ def exponents_of(options: argparse.Namespace) -> Floats:
     if options.family == "thesis":
         return thesis_exponents(options.terms)
     return np.full(max(options.terms, 0), 0.5)
-
-
-def power_sum_weight(options: argparse.Namespace) -> float:
-    """Return the velocity weight of a power sum: none for J1."""
-    if options.objective in FITTED_ON:
-        raise RangeError(
-            f"--objective {options.objective} is for --kind dissipation; "
-            "a power_sum takes J1 or J2"
-        )
-    return 0.0 if options.objective == "J1" else float(options.velocity_weight)
 
 
 def support_of(options: argparse.Namespace, data: TrainingData) -> PointContacts | None:

@@ -80,6 +80,8 @@ friction_limits: [0.5, 0.5, 0.5]
     [
         (["--terms", "2", "--characteristic-length", "0.15"], "power_sum", 6.0),
         (["--family", "norms", "--objective", "J1"], "power_sum", 9.0),
+        (["--objective", "second"], "power_sum", 9.0),
+        (["--kind", "polynomial"], "polynomial", 14.0),
         (["--kind", "dissipation"], "dissipation", 0.5),
         (["--kind", "dissipation", "--load-noise", "0.05", "--terms", "2"], "dissipation", 9.0),
     ],
@@ -108,8 +110,11 @@ def test_the_automatic_fit_stores_its_choice_and_its_bootstrap(pushes, tmp_path)
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--objective", "forces"], "--objective forces is for --kind dissipation"),
-        (["--kind", "dissipation", "--objective", "J2"], "fitted_on must be one of"),
+        (
+            ["--objective", "forces"],
+            "--objective forces is not for --kind power_sum, which takes J2",
+        ),
+        (["--kind", "dissipation", "--objective", "J2"], "which takes forces, directions, both"),
         (["--bootstrap", "5"], "give both"),
         (["--auto", "--support"], "states no support points"),
         (["--terms", "0"], "terms must be at least 1"),
