@@ -43,6 +43,8 @@ examples:
   fit_decay f1 --terms 9 --output hockey_stick.yaml
   fit_decay f1 --terms 15 --method dde --max-delay 6 --output thesis.yaml
   fit_decay relaxation.csv --value-column force --terms 7 --norm 2 --output relaxation.yaml
+  fit_decay bag_folder --topic /wrench --field wrench.force.x --start 1.5 --terms 5 \\
+      --output relaxation.yaml
 """
 
 

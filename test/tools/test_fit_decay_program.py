@@ -118,6 +118,78 @@ def test_methods_and_terms_are_compared_in_one_table(capsys):
     assert errors["| esprit", "7"] < errors["| esprit", "5"]
 
 
+def write_bag(folder, storage="SQLITE3", count=201):
+    """Write a relaxing force, its onset at 1 s, on /wrench, and a plain number on /number."""
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    typesys = pytest.importorskip("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
+    types = store.types
+    wrench_type, number_type = "geometry_msgs/msg/WrenchStamped", "std_msgs/msg/Float64"
+    vector, header = types["geometry_msgs/msg/Vector3"], types["std_msgs/msg/Header"]
+    plugin = getattr(rosbag2.StoragePlugin, storage)
+    with rosbag2.Writer(folder, version=9, storage_plugin=plugin) as writer:
+        wrenches = writer.add_connection("/wrench", wrench_type, typestore=store)
+        plain = writer.add_connection("/number", number_type, typestore=store)
+        for k in range(count):
+            nanoseconds = 1_000_000_000_000 + k * 25_000_000
+            t = 0.025 * k
+            force = 8.0 * np.exp(-1.5 * max(t - 1.0, 0.0))
+            stamp = types["builtin_interfaces/msg/Time"](*divmod(nanoseconds, 10**9))
+            wrench = types["geometry_msgs/msg/Wrench"](
+                vector(force, 0.0, 0.0), vector(0.0, 0.0, 0.0)
+            )
+            message = types[wrench_type](header(stamp, "tool"), wrench)
+            late = nanoseconds + 7_000_000
+            writer.write(wrenches, late, store.serialize_cdr(message, wrench_type))
+            number = types[number_type](force)
+            writer.write(plain, nanoseconds, store.serialize_cdr(number, number_type))
+    return folder
+
+
+@pytest.mark.parametrize("storage", ["SQLITE3", "MCAP"])
+def test_a_measured_relaxation_in_a_bag_becomes_a_model(tmp_path, storage):
+    bag = write_bag(tmp_path / "bag", storage)
+    output = tmp_path / "model.yaml"
+    chosen = ["--topic", "wrench", "--field", "wrench.force.x", "--start", "1"]
+    assert fit_decay.main([str(bag), *chosen, "-n", "1", "-o", str(output)]) == 0
+    model = read_decay_model(output)
+    np.testing.assert_allclose(model.sum.rates, [-1.5], rtol=2e-3)
+    assert float(model.sum(0.0)) == pytest.approx(8.0, rel=1e-3)
+
+
+def test_the_only_number_of_a_message_needs_no_name(tmp_path):
+    bag = write_bag(tmp_path / "bag")
+    output = tmp_path / "model.yaml"
+    arguments = [str(bag), "--topic", "/number", "--start", "1", "-n", "1", "-o", str(output)]
+    assert fit_decay.main(arguments) == 0
+    np.testing.assert_allclose(read_decay_model(output).sum.rates, [-1.5], rtol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("extra", "message"),
+    [
+        ([], "is a bag: say which topic"),
+        (["--topic", "/force"], "has no topic /force; there are /number, /wrench"),
+        (["--topic", "/wrench"], "hold 6 numbers; name one: wrench.force.x"),
+        (["--topic", "/wrench", "--field", "force.x"], "have no number 'force.x'"),
+        (["--topic", "/number", "--start", "99"], "--start 99 must"),
+        (["--topic", "/number", "--start", "-1"], "--start -1 must"),
+    ],
+)
+def test_a_bag_that_does_not_hold_what_is_asked_says_what_it_holds(
+    tmp_path, capsys, extra, message
+):
+    bag = write_bag(tmp_path / "bag", count=5)
+    assert fit_decay.main([str(bag), "-n", "1", *extra]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_folder_that_is_no_bag_is_refused(tmp_path, capsys):
+    pytest.importorskip("rosbags")
+    assert fit_decay.main([str(tmp_path), "--topic", "/x", "-n", "1"]) == 2
+    assert "cannot be read as a bag" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("program", [fit_decay, compare_decays])
 def test_help_teaches_with_examples(program, capsys):
     with pytest.raises(SystemExit) as exit_code:
