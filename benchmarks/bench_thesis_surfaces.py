@@ -1,0 +1,193 @@
+"""Chapter 3 of the thesis: every model on three support points and on patches, beside the best
+figures known before.
+
+Training: 2000 random motions, and 150 loads on each facet of the support points. Tests: 2000 fresh
+motions for v = |v - v^| of unit twists, 1000 unit loads for f, the model's load against the exact
+one for the model's own motion, in parts of the friction force scale. Quantiles 50 / 95 / 100 %.
+Forces are in units of two friction limits, lengths of 150 mm.
+"""
+
+from __future__ import annotations
+
+import os
+
+for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+    os.environ.setdefault(_variable, "1")
+
+import sys
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from limit_surface_ros.errors import LimitSurfaceError, MissingExtraError
+from limit_surface_ros.fitting.dissipation import fit_dissipation
+from limit_surface_ros.fitting.multi_start import Search, process_pool
+from limit_surface_ros.fitting.polynomial import fit_polynomial
+from limit_surface_ros.fitting.power_sum import fit_power_sum
+from limit_surface_ros.fitting.result import FitResult
+from limit_surface_ros.fitting.second_approximation import fit_second_approximation
+from limit_surface_ros.fitting.simulation import simulated_pairs
+from limit_surface_ros.surface import shapes
+from limit_surface_ros.surface.contact_patch import ContactPatch
+from limit_surface_ros.surface.measures import load_error, quantiles
+from limit_surface_ros.surface.pairs import Pairs
+from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.power_sum import thesis_exponents
+from limit_surface_ros.surface.protocol import LimitSurface
+from limit_surface_ros.surface.sampling import random_directions, random_motions
+from limit_surface_ros.surface.scaling import Scaling
+
+SCALING = Scaling(0.15, 1.0)
+CORNERS = np.array([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]])
+NOISE = 0.05
+
+# The best figures known before, v and f of each, by body and model.
+KNOWN = {
+    "points": {
+        "1 term, J1": (".101 / .389 / .664", ".232 / .529 / .720"),
+        "1 term, J2": (".088 / .358 / .604", ".261 / .566 / .773"),
+        "2 terms, J1": (".121 / .238 / .324", ".152 / .434 / .665"),
+        "2 terms, J2": (".061 / .155 / .338", ".134 / .420 / .594"),
+        "3 terms, J1": (".102 / .246 / .346", ".189 / .480 / .686"),
+        "3 terms, J2": (".058 / .123 / .321", ".148 / .416 / .617"),
+        "4 terms, J1": (".106 / .301 / .439", ".196 / .544 / .911"),
+        "4 terms, J2": (".052 / .120 / .307", ".129 / .432 / .747"),
+        "3 norms, J1": (".108 / .246 / .268", ".149 / .476 / .649"),
+        "3 norms, J2": (".057 / .120 / .293", ".113 / .398 / .611"),
+        "4 norms, J1": (".095 / .236 / .366", ".152 / .528 / .702"),
+        "4 norms, J2": (".054 / .097 / .264", ".125 / .413 / .592"),
+        "dissipation 2, forces": (".072 / .216 / .420", ".047 / .226 / .642"),
+        "dissipation 3, forces": ("0 / 0 / 0", "0 / 0 / 0"),
+    },
+    "patch": {
+        "1 term, J1": (".077 / .384 / .513", ".107 / .221 / .249"),
+        "1 term, J2": (".065 / .278 / .375", ".155 / .313 / .358"),
+        "2 terms, J1": (".048 / .283 / .380", ".056 / .114 / .156"),
+        "2 terms, J2": (".032 / .083 / .158", ".055 / .131 / .150"),
+        "3 terms, J1": (".043 / .157 / .234", ".031 / .071 / .103"),
+        "3 terms, J2": (".021 / .057 / .129", ".113 / .149 / .151"),
+        "4 terms, J1": (".038 / .117 / .159", ".026 / .052 / .084"),
+        "4 terms, J2": (".015 / .044 / .121", ".076 / .112 / .126"),
+        "4 norms, J1": (".032 / .096 / .134", ".026 / .040 / .069"),
+        "4 norms, J2": (".016 / .041 / .114", ".093 / .151 / .182"),
+        "dissipation 4, forces": (".028 / .103 / .147", ".004 / .022 / .069"),
+        "dissipation 6, forces": (".014 / .052 / .084", ".002 / .012 / .049"),
+    },
+}
+
+
+def bodies() -> dict[str, PointContacts]:
+    """Return the exact surfaces, each of total friction 1.5 N."""
+
+    def patch(cells: shapes.Cells) -> PointContacts:
+        exact = ContactPatch.of_shape(cells).surface(0.5, 3.0)
+        return PointContacts(exact.points, exact.friction_limits, SCALING)
+
+    return {
+        "points": PointContacts(CORNERS, np.full(3, 0.5), SCALING),
+        "patch": patch(shapes.polygon(CORNERS, [], 800)),
+        "square": patch(shapes.rectangle(np.array([0.15, 0.15]), 800)),
+        "ellipse": patch(shapes.ellipse(np.array([0.1, 0.05]), 800)),
+    }
+
+
+def models(search: Search, body: str) -> dict[str, Callable[[Pairs], FitResult]]:
+    """Return every fit of the tables by its name."""
+    fits: dict[str, Callable[[Pairs], FitResult]] = {}
+
+    def power(exponents: Sequence[float], weight: float) -> Callable[[Pairs], FitResult]:
+        return lambda pairs: fit_power_sum(
+            pairs, exponents, velocity_weight=weight, scaling=SCALING, search=search
+        )
+
+    def dissipation(terms: int, fitted_on: str) -> Callable[[Pairs], FitResult]:
+        few = Search(6, executor=search.executor)
+        return lambda pairs: fit_dissipation(
+            pairs, terms, fitted_on=fitted_on, floor=1e-5, scaling=SCALING, search=few
+        )
+
+    def second(weight: float) -> Callable[[Pairs], FitResult]:
+        return lambda pairs: fit_second_approximation(
+            pairs, velocity_weight=weight, scaling=SCALING, search=search
+        )
+
+    for label, weight in (("J1", 0.0), ("J2", 1.0)):
+        for terms in (1, 2, 3, 4):
+            name = f"{terms} term{'s' * (terms > 1)}, {label}"
+            fits[name] = power(list(thesis_exponents(terms)), weight)
+        for terms in (3, 4):
+            fits[f"{terms} norms, {label}"] = power([0.5] * terms, weight)
+        fits[f"second approximation, {label}"] = second(weight)
+    for terms in (2, 3) if body == "points" else (2, 3, 4, 5, 6):
+        fits[f"dissipation {terms}, forces"] = dissipation(terms, "forces")
+    for terms in (2, 3, 4):
+        fits[f"dissipation {terms}, directions"] = dissipation(terms, "directions")
+    fits["polynomial, least squares"] = lambda pairs: fit_polynomial(pairs, scaling=SCALING)
+    fits["polynomial, convex"] = lambda pairs: fit_polynomial(
+        pairs, velocity_weight=1.0, convex=True, scaling=SCALING
+    )
+    return fits
+
+
+def force_quantiles(surface: LimitSurface, exact: PointContacts) -> np.ndarray:
+    """Return the quantiles of the force error at the model's own motions.
+
+    Both loads are those of the same motion, so that facets, where many loads share one, do not
+    count a choice among them as an error.
+    """
+    loads = random_directions(1000, 3) * SCALING.wrench_unit
+    twists = surface.twist_of_wrench(loads)
+    return quantiles(load_error(surface, Pairs(exact.wrench_of_twist(twists), twists)))
+
+
+def shown(values: np.ndarray) -> str:
+    """Return three quantiles as the tables have them."""
+    return " / ".join(f"{value:.3f}".lstrip("0") for value in values)
+
+
+def print_table(title: str, body: str, exact: PointContacts, noise: float, search: Search) -> None:
+    """Fit every model to one body and print its row."""
+    pairs = simulated_pairs(exact, load_noise=noise, motion_noise=noise)
+    test = random_motions(exact, 2000, 2)
+    known = KNOWN.get(body, {}) if not noise else {}
+    print(f"### {title}\n")
+    print("| model | cost | starts | s | v | known | f | known |")
+    print("|---|---|---|---|---|---|---|---|")
+    for name, fit in models(search, body).items():
+        try:
+            result = fit(pairs).tested_on(test)
+            force = shown(force_quantiles(result.surface, exact))
+        except MissingExtraError as error:
+            print(f"| {name} | skipped: {error} | | | | | | |")
+            continue
+        except LimitSurfaceError as error:
+            print(f"| {name} | no surface: {str(error)[:60]} | | | | | | |", flush=True)
+            continue
+        assert result.held_out is not None
+        v_known, f_known = known.get(name, ("", ""))
+        print(
+            f"| {name} | {result.cost:.4g} | {len(result.start_costs)} | {result.wall_time:.2f} | "
+            f"{shown(result.held_out.velocity)} | {v_known} | {force} | {f_known} |",
+            flush=True,
+        )
+    print()
+
+
+def main() -> int:
+    """Print all tables."""
+    print(__doc__)
+    exact = bodies()
+    with process_pool(2) as executor:
+        search = Search(32, executor=executor)
+        print_table("Three support points", "points", exact["points"], 0.0, search)
+        print_table("Triangular patch", "patch", exact["patch"], 0.0, search)
+        print_table("Square patch", "square", exact["square"], 0.0, search)
+        print_table("Elliptical patch", "ellipse", exact["ellipse"], 0.0, search)
+        for body, name in (("points", "Three support points"), ("patch", "Triangular patch")):
+            title = f"{name}, {100 * NOISE:.0f} % noise on loads and motions"
+            print_table(title, body, exact[body], NOISE, search)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
