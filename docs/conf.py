@@ -49,14 +49,14 @@ def setup(app):
     """Have docstrings marked up before they are taken apart."""
 
     def mark_up(app, what, name, item, options, lines):
-        marked, literal = [], False
-        for line in lines:
-            # An example of a file starts with its schema and ends with an empty line.
-            if line.startswith("schema:") and not literal:
-                marked += [".. code-block:: yaml", ""]
-                literal = True
-            literal = literal and bool(line)
-            marked.append(f"   {line}" if literal else as_markup(line))
+        marked = []
+        for paragraph in "\n".join(lines).split("\n\n"):
+            rows = paragraph.split("\n")
+            if what == "module" and any(row.startswith(" ") for row in rows):
+                # An example of a file, or a table: shown as it stands.
+                marked += [".. code-block:: text", "", *(f"   {row}" for row in rows), ""]
+            else:
+                marked += [*map(as_markup, rows), ""]
         lines[:] = marked
 
     app.connect("autodoc-process-docstring", mark_up, priority=100)

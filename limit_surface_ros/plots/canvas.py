@@ -34,6 +34,7 @@ CYCLE = (BLUE, VERMILION, GREEN, PURPLE, SKY, ORANGE, BLACK)
 # Told apart by more than colour, also on a grey printer.
 DASHES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 3)))
 
+DPI = 150.0
 SUFFIXES = (".png", ".svg", ".pdf")
 
 _STYLE: Any = {
@@ -53,7 +54,6 @@ _STYLE: Any = {
     "legend.fontsize": 8,
     "legend.framealpha": 0.85,
     "lines.linewidth": 1.6,
-    "savefig.dpi": 150,
     "svg.hashsalt": "limit_surface_ros",
     "xtick.labelsize": 8,
     "ytick.labelsize": 8,
@@ -87,8 +87,13 @@ def new_figure(width: float, height: float) -> Iterator[Figure]:
         yield Figure(figsize=(width, height))
 
 
-def save_figure(figure: Figure, path: str | Path) -> None:
+def save_figure(figure: Figure, path: str | Path, dpi: float = DPI) -> None:
     """Write a figure in one step, by its suffix as PNG, SVG or PDF; the same picture, same bytes.
+
+    Args:
+        figure: The figure.
+        path: Where to write it.
+        dpi: Dots to the inch of a PNG.
 
     Raises:
         FileError: The suffix is another, or the file cannot be written.
@@ -101,7 +106,7 @@ def save_figure(figure: Figure, path: str | Path) -> None:
 
     stream = io.BytesIO()
     with rc_context(_STYLE):
-        figure.savefig(stream, format=suffix[1:], metadata=_METADATA[suffix])
+        figure.savefig(stream, format=suffix[1:], dpi=dpi, metadata=_METADATA[suffix])
     write_atomically(path, stream.getvalue())
 
 

@@ -26,8 +26,10 @@ SECTIONS = ((0, 1), (0, 2), (1, 2))
 SLAB = 0.05
 
 _SECTION_POINTS = 721
-_MERIDIANS, _PARALLELS = 73, 47
+_MERIDIANS, _PARALLELS = 97, 65
 _MOST_DOTS = 1500
+# By the number of surfaces in one picture.
+_ZOOM = {1: 1.15, 2: 0.98, 3: 0.92, 4: 0.9}
 # Where the viewer stands and where the light comes from [deg].
 _AZIMUTH, _ELEVATION = -55.0, 24.0
 _LIGHT = (-80.0, 45.0)
@@ -111,6 +113,7 @@ def draw_solid(
     loads: Floats | None = None,
     color: str = CYCLE[0],
     dot_color: str = BLACK,
+    zoom: float = 0.9,
 ) -> None:
     """Draw a surface in load space, lit from above, with the loads that data give as dots.
 
@@ -121,6 +124,7 @@ def draw_solid(
             surface only those on the viewer's side, as behind it they would not be seen.
         color: Of the surface.
         dot_color: Of the loads.
+        zoom: How much of the panel is used; beyond 0.9 a narrow one cuts the labels off.
     """
     grid = np.zeros((1, 1, 3)) if surface is None else surface_grid(surface)
     extent = np.abs(grid).max(axis=(0, 1))
@@ -144,10 +148,10 @@ def draw_solid(
         if surface is not None:
             dots = dots[(dots / extent) @ _unit_vector(_AZIMUTH, _ELEVATION) > 0.0]
         axes.scatter(*dots.T, s=3, color=dot_color, linewidths=0, depthshade=False, zorder=2)
-    style_solid(axes, extent)
+    style_solid(axes, extent, zoom)
 
 
-def style_solid(axes: Axes3D, extent: Floats) -> None:
+def style_solid(axes: Axes3D, extent: Floats, zoom: float = 0.9) -> None:
     """Give three-dimensional axes their labels, limits and point of view."""
     limits: dict[str, Any] = {
         f"{name}lim": (-1.02 * half, 1.02 * half) for name, half in zip("xyz", extent, strict=True)
@@ -160,7 +164,7 @@ def style_solid(axes: Axes3D, extent: Floats) -> None:
     axes.tick_params(axis="z", pad=2)
     for name in "xyz":
         axes.locator_params(axis=name, nbins=4)
-    axes.set_box_aspect((1.0, 1.0, 0.85), zoom=0.9)
+    axes.set_box_aspect((1.0, 1.0, 0.85), zoom=zoom)
     axes.view_init(elev=_ELEVATION, azim=_AZIMUTH)
 
 
@@ -181,8 +185,8 @@ def draw_surfaces(surfaces: Mapping[str, LimitSurface], loads: Floats | None = N
         above, below = figure.subfigures(2, 1, height_ratios=(1.25, 1.0))
         for index, (name, surface) in enumerate(surfaces.items()):
             solid: Any = above.add_subplot(1, len(surfaces), index + 1, projection="3d")
-            draw_solid(solid, surface, loads, CYCLE[index])
-            solid.set_title(name, y=0.97)
+            draw_solid(solid, surface, loads, CYCLE[index], zoom=_ZOOM[len(surfaces)])
+            solid.set_title(name, y=1.0)
         panels = below.subplots(1, 3)
         for axes, components in zip(panels, SECTIONS, strict=True):
             draw_section(axes, surfaces, components, loads)

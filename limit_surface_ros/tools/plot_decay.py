@@ -7,11 +7,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from limit_surface_ros.checks import as_positive
 from limit_surface_ros.decay.examples import EXAMPLES, example
 from limit_surface_ros.errors import FileError
 from limit_surface_ros.files.decay_file import read_decay_model
 from limit_surface_ros.files.response_csv import read_response
-from limit_surface_ros.plots.canvas import SUFFIXES, save_figure
+from limit_surface_ros.plots.canvas import DPI, SUFFIXES, save_figure
 from limit_surface_ros.plots.decay_view import PROJECTION, draw_decay
 from limit_surface_ros.tools.program import run_program
 
@@ -48,6 +49,9 @@ def parser() -> argparse.ArgumentParser:
         help=f"picture to write: {', '.join(SUFFIXES)} (%(default)s)",
     )
     top.add_argument(
+        "--dpi", type=float, default=DPI, help="dots to the inch of a PNG (%(default)g)"
+    )
+    top.add_argument(
         "--response",
         metavar="X",
         help=f"what the model stands for: an example ({', '.join(EXAMPLES)}) or a CSV file",
@@ -80,7 +84,8 @@ def response_of(model: DecayModel, options: argparse.Namespace) -> Target | None
 def run(options: argparse.Namespace) -> None:
     """Read, draw, write."""
     model = read_decay_model(options.model)
-    save_figure(draw_decay(model, response_of(model, options)), options.output)
+    figure = draw_decay(model, response_of(model, options))
+    save_figure(figure, options.output, as_positive("--dpi", options.dpi))
     print(f"written     {options.output}")
 
 

@@ -7,17 +7,26 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from limit_surface_ros.checks import as_positive
 from limit_surface_ros.errors import DataError
+from limit_surface_ros.files.contact_file import read_contact
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.files.surface_file import read_surface_model
-from limit_surface_ros.plots.canvas import SUFFIXES, save_figure
+from limit_surface_ros.plots.canvas import DPI, SUFFIXES, save_figure
 from limit_surface_ros.plots.surface_view import draw_surfaces
+from limit_surface_ros.surface.sampling import facet_loads, random_motions
 from limit_surface_ros.tools.program import run_program
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from limit_surface_ros.checks import Floats
     from limit_surface_ros.surface.protocol import LimitSurface
+
+# Loads that are simulated of a contact; of many points the facets are too small to be seen.
+MOTIONS, FACET_LOADS, FEW_POINTS = 1200, 60, 12
 
 EPILOG = """\
 The upper row shows each surface in load space, the lower row their sections through the planes
@@ -25,7 +34,7 @@ tau_z = 0, f_y = 0 and f_x = 0, all of them over each other. Loads of --data are
 those that lie near its plane.
 
 examples:
-  plot_surface model.yaml
+  plot_surface model.yaml --data contact.yaml
   plot_surface ellipsoid.yaml norms.yaml --data pushes.csv --output both.png
 """
 
@@ -49,9 +58,30 @@ def parser() -> argparse.ArgumentParser:
         help=f"picture to write: {', '.join(SUFFIXES)} (%(default)s)",
     )
     top.add_argument(
-        "--data", type=Path, metavar="FILE", help="recorded pushes (.csv) to draw with them"
+        "--dpi", type=float, default=DPI, help="dots to the inch of a PNG (%(default)g)"
+    )
+    top.add_argument(
+        "--data",
+        type=Path,
+        metavar="FILE",
+        help="recorded pushes (.csv), or a contact file (.yaml) of which loads are simulated",
     )
     return top
+
+
+def loads_of(path: Path) -> Floats:
+    """Return the loads that data give, shape (n, 3): recorded ones, or those of a contact.
+
+    Raises:
+        FileError: The file is no valid one of its suffix.
+    """
+    if path.suffix.lower() not in (".yaml", ".yml"):
+        return read_pushes(path).pairs.wrenches
+    surface = read_contact(path).surface
+    loads = [random_motions(surface, MOTIONS, 0).wrenches]
+    if len(surface.points) <= FEW_POINTS:
+        loads.append(facet_loads(surface, FACET_LOADS, 0).wrenches)
+    return np.vstack(loads)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -62,8 +92,8 @@ def run(options: argparse.Namespace) -> None:
         if model.name in surfaces:
             raise DataError(f"{path}: another file holds a model named {model.name!r}, too")
         surfaces[model.name] = model.surface
-    loads = None if options.data is None else read_pushes(options.data).pairs.wrenches
-    save_figure(draw_surfaces(surfaces, loads), options.output)
+    loads = None if options.data is None else loads_of(options.data)
+    save_figure(draw_surfaces(surfaces, loads), options.output, as_positive("--dpi", options.dpi))
     print(f"written     {options.output}")
 
 
