@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 # Cells into which `time_to_level` cuts an interval at each level of its search.
 SEARCH_CELLS = 128
+# exp(-VANISHED) is zero in double precision.
+VANISHED = 800.0
 # Exponentials that are evaluated at a time.
 BLOCK = 1 << 18
 
@@ -261,10 +263,14 @@ class ExponentialSum:
     def _at(self, times: Floats) -> Floats:
         flat = times.reshape(-1)
         values = np.empty(flat.shape)
+        slowest = self.slowest_rate
+        # All is zero by then; at 1e308 s, exp would make NaN of an infinite phase.
+        last = VANISHED / -slowest if slowest < 0.0 else math.inf
         # In blocks: the waves of a million times at once would be a gigabyte.
         step = max(1, BLOCK // len(self.rates))
         for start in range(0, len(flat), step):
-            waves = np.exp(np.multiply.outer(flat[start : start + step], self.rates))
+            block = np.minimum(flat[start : start + step], last)
+            waves = np.exp(np.multiply.outer(block, self.rates))
             values[start : start + step] = (waves @ self.coefficients).real
         return values.reshape(times.shape)
 

@@ -120,6 +120,12 @@ def test_one_time_gives_one_value_and_many_keep_their_shape():
     assert x(np.zeros((2, 3))).shape == (2, 3)
 
 
+@given(seeds, st.sampled_from([1e4, 1e100, 1e300, 1.7e308]))
+@settings(max_examples=20, deadline=None)
+def test_a_sum_that_decays_is_zero_at_the_end_of_time(seed, time):
+    assert float(random_sum(seed)(time)) == 0.0
+
+
 def test_a_million_times_need_no_more_memory_than_their_values():
     x = random_sum(5, most=6)
     t = np.linspace(0.0, 5.0, 1_000_001)
