@@ -14,16 +14,23 @@ from limit_surface_ros.surface.plane_minimum import Gauge, certain_minimum, plan
 from limit_surface_ros.surface.sphere import even_directions
 
 if TYPE_CHECKING:
+    from typing import TypeAlias
+
+    from numpy.typing import NDArray
+
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.surface.corners import Corners
 
-# Neighbours of a start among which it must be best to be a peak, and peaks that are climbed.
+    Places: TypeAlias = NDArray[np.intp]
+
+# Neighbours of a start among which it must be best to be a peak.
 _NEIGHBOURS = 8
-_PEAKS = 8
+# Vectors whose table stays in the processor's cache.
+_TABLE_COLUMNS = 200
 # A lower peak is climbed if the table shows at least this part of the best one's power.
 _WORTH = 0.7
 # Steps by upper bounds before Newton's method: each at least halves the way to a ridge.
-_BOUND_STEPS = 15
+_BOUND_STEPS = 6
 # Effort for the axes in which a surface is about round.
 _FRAME_POINTS = 300
 _FRAME_STEPS = 6
@@ -112,26 +119,32 @@ class PeakInverse:
     def solve(self, normals: Floats) -> tuple[Floats, Floats]:
         """Return the points (3, m) of most power for vectors (3, m), and that power (m,)."""
         units = normals / np.sqrt((normals * normals).sum(axis=0))
+        found = [
+            self._peaks(units[:, start : start + _TABLE_COLUMNS])
+            for start in range(0, units.shape[1], _TABLE_COLUMNS)
+        ]
+        rows = np.concatenate([row for row, _ in found])
+        columns = np.concatenate(
+            [column + _TABLE_COLUMNS * block for block, (_, column) in enumerate(found)]
+        )
+        points = self._climb(units[:, columns], self._ellipsoids[rows])
+        power = (points * units[:, columns]).sum(axis=0)
+        # The highest comes last, and stays.
+        rising = np.argsort(power)
+        best = np.zeros(units.shape[1], dtype=np.intp)
+        best[columns[rising]] = rising
+        summits: Floats = points[:, best]
+        return summits, (normals * summits).sum(axis=0)
+
+    def _peaks(self, units: Floats) -> tuple[Places, Places]:
+        """Return the rows of the table that are worth climbing, and for which vectors (3, m)."""
         squares = (units[:, np.newaxis] * units).reshape(9, -1)
         reach = self._ellipsoids.reshape(-1, 9) @ squares
-        peaks = reach.copy()
+        high = reach >= _WORTH**2 * reach.max(axis=0)
         for neighbour in self._neighbours.T:
-            peaks[reach < reach[neighbour]] = -np.inf
-        order = np.argpartition(-peaks, _PEAKS, axis=0)[:_PEAKS]
-        heights = np.take_along_axis(peaks, order, axis=0)
-        worth = heights >= _WORTH**2 * heights.max(axis=0)
-        best = np.zeros_like(units)
-        best_power = np.zeros(units.shape[1])
-        for row, climbed in zip(order, worth, strict=True):
-            columns = np.flatnonzero(climbed)
-            if len(columns) == 0:
-                continue
-            points = self._climb(units[:, columns], self._ellipsoids[row[columns]])
-            power = (points * units[:, columns]).sum(axis=0)
-            better = power > best_power[columns]
-            best[:, columns[better]] = points[:, better]
-            best_power[columns[better]] = power[better]
-        return best, (normals * best).sum(axis=0)
+            high &= reach >= reach[neighbour]
+        rows, columns = np.nonzero(high)
+        return rows, columns
 
     def _inside(self, points: Floats) -> Floats:
         """Return ellipsoids (m, 3, 3) within the surface through its points (3, m).
