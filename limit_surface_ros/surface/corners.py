@@ -8,11 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from limit_surface_ros.checks import Floats
 
 # Relative width of the rim that counts as part of a cone of normals.
 _RIM = 1e-12
 _NO_POWER = 1e-100
+# Elements of one array of normals by corners, of which several stay in the processor's cache.
+_ELEMENTS = 2**14
 # Curvature below which a surface counts as flat beside a corner.
 _FLAT = 1e-3
 
@@ -69,23 +73,39 @@ class Corners:
             Distances (m,) from the axis of the cone in its own radii, at most 1 within it; and
             points (3, m), not scaled: exact within the cone, of second order beyond.
         """
-        factors = self.points @ normals
-        # A normal without power is infinitely far: a large number will do, and no warning.
-        factors[np.abs(factors) < _NO_POWER] = _NO_POWER
-        first = (self.inverses[:, 0] @ normals) / factors - self.centres[:, :1]
-        second = (self.inverses[:, 1] @ normals) / factors - self.centres[:, 1:]
-        squares = first * first + second * second
-        which = squares.argmin(axis=0)
-        columns = np.arange(normals.shape[1])
-        distance = np.sqrt(squares[which, columns])
+        which = self._nearest(normals)
+        power = (self.points[which].T * normals).sum(axis=0)
+        power[np.abs(power) < _NO_POWER] = _NO_POWER
+        q = np.einsum("mij,jm->im", self.inverses[which], normals) / power
+        q -= self.centres[which].T
+        distance = np.hypot(q[0], q[1])
         # The rim belongs to the cone.
         distance[distance <= 1.0 + _RIM] = 1.0
-        q = np.array([first[which, columns], second[which, columns]])
         # |y| - q.y + y'My/2 in y = R_k (x - x_k) is least near y along q, this far out:
         bend = np.einsum("im,mij,jm->m", q, self.bends[which], q) + _FLAT * distance**2
         y = q * np.maximum((distance - 1.0) * distance / bend, 0.0)
         move = np.einsum("mij,im->jm", self.inverses[which], y)
         kink = self.points[which].T
-        power = factors[which, columns]
         points = np.sign(power) * (kink + move - kink * ((normals * move).sum(axis=0) / power))
         return distance, points
+
+    def _nearest(self, normals: Floats) -> NDArray[np.intp]:
+        """Return which corner is nearest to each normal, (m,)."""
+        which = np.empty(normals.shape[1], dtype=np.intp)
+        count = max(1, _ELEMENTS // len(self.points))
+        for start in range(0, len(which), count):
+            block = slice(start, start + count)
+            rows = normals[:, block].T
+            powers = rows @ self.points.T
+            # A normal without power is infinitely far: a large number will do, and no warning.
+            powers[np.abs(powers) < _NO_POWER] = _NO_POWER
+            np.divide(1.0, powers, out=powers)
+            squares = rows @ self.inverses[:, 0].T
+            second = rows @ self.inverses[:, 1].T
+            for arms, centre in ((squares, self.centres[:, 0]), (second, self.centres[:, 1])):
+                arms *= powers
+                arms -= centre
+                arms *= arms
+            squares += second
+            which[block] = squares.argmin(axis=1)
+        return which

@@ -14,10 +14,14 @@ from limit_surface_ros.surface.corners import Corners
 from limit_surface_ros.surface.plane_minimum import Gauge
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from limit_surface_ros.checks import Floats
 
 # A term whose norm is smaller than this, relative to what it could be, is at its kink.
 KINK = 1e-14
+# Elements of one array of points by motions, of which several stay in the processor's cache.
+_ELEMENTS = 2**14
 
 
 class DissipationTerms(Gauge, Protocol):
@@ -50,6 +54,14 @@ class FormTerms:
             norm = np.sqrt((image * image).sum(axis=0))
             norm[norm <= KINK * size * length] = np.inf
             total += root.T @ (image / norm)
+        return total
+
+    def values(self, twists: Floats) -> Floats:
+        """Return D (m,)."""
+        total: Floats = np.zeros(twists.shape[1])
+        for root in self._roots:
+            image = root @ twists
+            total += np.sqrt((image * image).sum(axis=0))
         return total
 
     def derivatives(self, twists: Floats, smoothing: Floats) -> tuple[Floats, Floats, Floats]:
@@ -91,43 +103,68 @@ class PointTerms:
         ones = np.ones_like(x)
         self._limits = limits
         self._x, self._y = x[:, np.newaxis], y[:, np.newaxis]
-        self._reach = np.maximum(np.hypot(x, y), 1.0)[:, np.newaxis]
-        self._first_moments = limits * np.array([ones, x, y])
-        self._second_moments = limits * np.array([ones, x, y, x * x, x * y, y * y])
+        self._reach = max(1.0, float(np.hypot(x, y).max()))
+        self._load_moments = limits * np.array([ones, x, y])
+        self._along_moments = limits * np.array([ones, y, y * y])
+        self._beside_moments = limits * np.array([ones, x, x * x])
+        self._cross_moments = limits * np.array([ones, x, y, x * y])
 
     def gradient(self, twists: Floats) -> Floats:
         """Return the gradient (3, m) of D; a point at rest adds nothing."""
-        wx, wy = self._velocities(twists)
-        speed = np.sqrt(wx * wx + wy * wy)
-        speed[speed <= KINK * self._reach * np.abs(twists).max(axis=0)] = np.inf
-        wx /= speed
-        wy /= speed
-        return self._load(wx, wy)
+        total: Floats = np.zeros_like(twists)
+        for part in self._parts(twists.shape[1]):
+            wx, wy = self._velocities(twists, part)
+            speed = self._speeds(wx, wy, twists)
+            wx /= speed
+            wy /= speed
+            total += self._load(wx, wy, part)
+        return total
+
+    def values(self, twists: Floats) -> Floats:
+        """Return D (m,)."""
+        total: Floats = np.zeros(twists.shape[1])
+        for part in self._parts(twists.shape[1]):
+            wx, wy = self._velocities(twists, part)
+            wx *= wx
+            wy *= wy
+            wx += wy
+            total += self._limits[part] @ np.sqrt(wx, out=wx)
+        return total
 
     def derivatives(self, twists: Floats, smoothing: Floats) -> tuple[Floats, Floats, Floats]:
         """Return D, its gradient and Hessian; see `Gauge`."""
-        ex, ey = self._velocities(twists)
-        smooth = bool(smoothing.any())
-        softness = np.square(self._reach * smoothing) if smooth else 0.0
-        speed = np.sqrt(ex * ex + ey * ey + softness)
-        total = self._limits @ speed
-        speed[speed <= KINK * self._reach * np.abs(twists).max(axis=0)] = np.inf
-        slowness = 1.0 / speed
-        ex *= slowness
-        ey *= slowness
-        gradient = self._load(ex, ey)
-        # The Hessian of a speed is [ey^2, -ex ey; -ex ey, ex^2] / speed where nothing is smoothed.
-        across = self._second_moments @ (slowness * ex * ey)
-        in_x = self._second_moments @ (slowness * ey * ey)
-        in_y = self._second_moments @ (slowness * ex * ex)
-        if smooth:
-            rounding = self._second_moments @ (slowness**3 * softness)
-            in_x += rounding
-            in_y += rounding
-        xx, xy, yy = in_x[0], -across[0], in_y[0]
-        xt, yt = -in_x[2] - across[1], in_y[1] + across[2]
-        tt = in_x[5] + 2.0 * across[4] + in_y[3]
-        return total, gradient, np.array([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])
+        softness = np.square(self._reach * smoothing) if smoothing.any() else None
+        total: Floats = np.zeros(twists.shape[1])
+        gradient: Floats = np.zeros_like(twists)
+        hessian: Floats = np.zeros((3, 3, twists.shape[1]))
+        for part in self._parts(twists.shape[1]):
+            ex, ey = self._velocities(twists, part)
+            speed = self._speeds(ex, ey, twists, softness)
+            total += self._limits[part] @ np.where(speed < np.inf, speed, 0.0)
+            slowness = np.divide(1.0, speed, out=speed)
+            ex *= slowness
+            ey *= slowness
+            gradient += self._load(ex, ey, part)
+            # A speed's Hessian is [ey^2, -ex ey; -ex ey, ex^2] / speed if nothing is smoothed.
+            bent = slowness * ex
+            across = self._cross_moments[:, part] @ (bent * ey)
+            bent *= ex
+            in_y = self._beside_moments[:, part] @ bent
+            np.multiply(slowness, ey, out=bent)
+            bent *= ey
+            in_x = self._along_moments[:, part] @ bent
+            if softness is not None:
+                rounding = slowness**3 * softness
+                in_x += self._along_moments[:, part] @ rounding
+                in_y += self._beside_moments[:, part] @ rounding
+            hessian[0, 0] += in_x[0]
+            hessian[0, 1] -= across[0]
+            hessian[1, 1] += in_y[0]
+            hessian[0, 2] -= in_x[1] + across[1]
+            hessian[1, 2] += in_y[1] + across[2]
+            hessian[2, 2] += in_x[2] + 2.0 * across[3] + in_y[2]
+        hessian[1, 0], hessian[2, 0], hessian[2, 1] = hessian[0, 1], hessian[0, 2], hessian[1, 2]
+        return total, gradient, hessian
 
     def corners(self) -> Corners | None:
         """Return the rotations about each support point."""
@@ -139,12 +176,32 @@ class PointTerms:
         roots = (self._limits * jacobians).transpose(2, 0, 1)
         return Corners.of_norms(kinks, roots, gradients, hessians)
 
-    def _velocities(self, twists: Floats) -> tuple[Floats, Floats]:
-        vx, vy, omega = twists
-        return vx - omega * self._y, vy + omega * self._x
+    def _parts(self, columns: int) -> Iterator[slice]:
+        """Yield slices of points, so short that arrays of them by motions stay in the cache."""
+        count = max(1, _ELEMENTS // max(columns, 1))
+        for start in range(0, len(self._limits), count):
+            yield slice(start, start + count)
 
-    def _load(self, ex: Floats, ey: Floats) -> Floats:
+    def _velocities(self, twists: Floats, part: slice) -> tuple[Floats, Floats]:
+        vx, vy, omega = twists
+        return vx - omega * self._y[part], vy + omega * self._x[part]
+
+    def _speeds(
+        self, wx: Floats, wy: Floats, twists: Floats, softness: Floats | None = None
+    ) -> Floats:
+        """Return speeds, infinite for points at rest so that they add nothing."""
+        speed = wx * wx
+        speed += wy * wy
+        if softness is not None:
+            speed += softness
+        least = np.square(KINK * self._reach * np.abs(twists).max(axis=0))
+        rest = speed <= least
+        if rest.any():
+            speed[rest] = np.inf
+        return np.sqrt(speed, out=speed)
+
+    def _load(self, ex: Floats, ey: Floats, part: slice) -> Floats:
         """Return the load (3, m) of forces m_k (ex, ey), shape (n, m), at the points."""
-        fx = self._first_moments @ ex
-        fy = self._first_moments @ ey
-        return np.array([fx[0], fy[0], fy[1] - fx[2]])
+        fx = self._load_moments[::2, part] @ ex
+        fy = self._load_moments[:2, part] @ ey
+        return np.array([fx[0], fy[0], fy[1] - fx[1]])

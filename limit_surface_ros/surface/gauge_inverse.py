@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 # Neighbours of a start among which it must be best to be a peak.
 _NEIGHBOURS = 8
+# Distance from a corner's cone, in its radii, up to which the start beside it may be the better.
+_BESIDE = 4.0
 # Vectors whose table stays in the processor's cache.
 _TABLE_COLUMNS = 200
 # A lower peak is climbed if the table shows at least this part of the best one's power.
@@ -66,7 +68,10 @@ class ConvexInverse:
         """
         self._gauge = gauge
         self._corners = corners
-        self._starts = directions / _values(gauge, directions)
+        values, gradients, hessians = gauge.derivatives(directions, np.zeros(directions.shape[1]))
+        self._starts = directions / values
+        self._gradients = gradients
+        self._hessians = hessians * values
 
     def solve(self, normals: Floats) -> tuple[Floats, Floats]:
         """Return the points (3, m) of most power for vectors (3, m), and that power (m,).
@@ -75,25 +80,28 @@ class ConvexInverse:
             SolverError: A point could not be certified.
         """
         units = normals / np.sqrt((normals * normals).sum(axis=0))
-        points = self._starts[:, np.argmax(self._starts.T @ units, axis=0)]
+        start = np.argmax(self._starts.T @ units, axis=0)
+        points = self._starts[:, start]
+        initial = np.ones(len(start)), self._gradients[:, start], self._hessians[:, :, start]
         smooth = np.arange(units.shape[1])
         if self._corners is not None:
             distance, near = self._corners.nearest(units)
             in_cone = distance <= 1.0
-            smooth = np.flatnonzero(~in_cone)
-            points[:, smooth] = self._better(units, points, near)[:, smooth]
             points[:, in_cone] = near[:, in_cone]
+            smooth = np.flatnonzero(~in_cone)
+            beside = smooth[distance[smooth] < _BESIDE]
+            power = (units * near).sum(axis=0)[beside] / self._gauge.values(near[:, beside])
+            beside = beside[power > (units * points).sum(axis=0)[beside]]
+            points[:, beside] = near[:, beside]
+            found = self._gauge.derivatives(near[:, beside], np.zeros(len(beside)))
+            initial[0][beside], initial[1][:, beside], initial[2][:, :, beside] = found
         if len(smooth):
-            points[:, smooth] = certain_minimum(self._gauge, units[:, smooth], points[:, smooth])
-        points /= _values(self._gauge, points)
+            known = initial[0][smooth], initial[1][:, smooth], initial[2][:, :, smooth]
+            points[:, smooth] = certain_minimum(
+                self._gauge, units[:, smooth], points[:, smooth], known
+            )
+        points /= self._gauge.values(points)
         return points, (normals * points).sum(axis=0)
-
-    def _better(self, units: Floats, first: Floats, second: Floats) -> Floats:
-        """Return of two points for each vector the direction of more power."""
-        powers = [(units * points).sum(axis=0) for points in (first, second)]
-        second_power = powers[1] / _values(self._gauge, second)
-        better: Floats = np.where(powers[0] >= second_power, first, second)
-        return better
 
 
 class PeakInverse:
@@ -112,7 +120,7 @@ class PeakInverse:
                 the surface, shape (3, d).
         """
         self._gauge = gauge
-        self._ellipsoids = self._inside(directions / _values(gauge, directions))
+        self._ellipsoids = self._inside(directions / gauge.values(directions))
         likeness = np.abs(directions.T @ directions)
         self._neighbours = np.argsort(-likeness, axis=1)[:, 1 : _NEIGHBOURS + 1]
 
@@ -163,7 +171,7 @@ class PeakInverse:
                 ellipsoids = self._gauge.ellipsoids(points / np.abs(points).max(axis=0))
                 points = np.einsum("mij,jm->im", ellipsoids, units)
         points, _ = plane_minimum(self._gauge, units, points, np.zeros(units.shape[1]))
-        return points / _values(self._gauge, points)
+        return points / self._gauge.values(points)
 
 
 class FramedInverse:
@@ -186,10 +194,6 @@ def round_frame(gauge: Gauge) -> Floats:
     frame = np.eye(3)
     for _ in range(_FRAME_STEPS):
         points = frame @ directions
-        points /= _values(gauge, points)
+        points /= gauge.values(points)
         frame = np.linalg.cholesky(3.0 * points @ points.T / _FRAME_POINTS)
     return frame
-
-
-def _values(gauge: Gauge, points: Floats) -> Floats:
-    return gauge.derivatives(points, np.zeros(points.shape[1]))[0]

@@ -14,7 +14,11 @@ import numpy as np
 from limit_surface_ros.errors import SolverError
 
 if TYPE_CHECKING:
+    from typing import TypeAlias
+
     from limit_surface_ros.checks import Bools, Floats
+
+    Derivatives: TypeAlias = tuple[Floats, Floats, Floats]
 
 # Newton's method stops after a step of this relative length: the next one would be its square.
 _LAST_STEP = 1e-8
@@ -32,6 +36,10 @@ _SMOOTHINGS = 0.3 * _RATIO ** np.arange(18)
 class Gauge(Protocol):
     """A positive function, homogeneous of degree one, smooth but for kinks."""
 
+    def values(self, points: Floats, /) -> Floats:
+        """Return the values (m,) at points (3, m)."""
+        ...
+
     def derivatives(self, points: Floats, smoothing: Floats, /) -> tuple[Floats, Floats, Floats]:
         """Return the values (m,), gradients (3, m) and Hessians (3, 3, m).
 
@@ -42,7 +50,9 @@ class Gauge(Protocol):
         ...
 
 
-def certain_minimum(gauge: Gauge, normals: Floats, starts: Floats) -> Floats:
+def certain_minimum(
+    gauge: Gauge, normals: Floats, starts: Floats, initial: Derivatives | None = None
+) -> Floats:
     """Return the points (3, m) where n.x = 1 and the gauge is least; see `plane_minimum`.
 
     Where Newton's method does not settle the minimum is near a kink: it is then followed while
@@ -51,7 +61,7 @@ def certain_minimum(gauge: Gauge, normals: Floats, starts: Floats) -> Floats:
     Raises:
         SolverError: A minimum could not be certified.
     """
-    found, settled = plane_minimum(gauge, normals, starts, np.zeros(starts.shape[1]))
+    found, settled = plane_minimum(gauge, normals, starts, np.zeros(starts.shape[1]), initial)
     hard = np.flatnonzero(~settled)
     if len(hard) == 0:
         return found
@@ -68,7 +78,11 @@ def certain_minimum(gauge: Gauge, normals: Floats, starts: Floats) -> Floats:
 
 
 def plane_minimum(
-    gauge: Gauge, normals: Floats, starts: Floats, smoothing: Floats
+    gauge: Gauge,
+    normals: Floats,
+    starts: Floats,
+    smoothing: Floats,
+    initial: Derivatives | None = None,
 ) -> tuple[Floats, Bools]:
     """Return the points (3, m) where n.x = 1 and the gauge is least, and which are certain.
 
@@ -80,13 +94,18 @@ def plane_minimum(
         normals: n, unit vectors, shape (3, m).
         starts: Points to start from, with n.x > 0, shape (3, m).
         smoothing: Passed to the gauge, shape (m,).
+        initial: The gauge's derivatives at the starts, if they are known.
     """
-    points = starts / (normals * starts).sum(axis=0)
+    scale = 1.0 / (normals * starts).sum(axis=0)
+    points = starts * scale
     result = points.copy()
     settled = np.zeros(points.shape[1], dtype=bool)
     todo = np.arange(points.shape[1])
     basis = _plane_basis(normals)
-    values, gradients, hessians = gauge.derivatives(points, smoothing)
+    if initial is None:
+        values, gradients, hessians = gauge.derivatives(points, smoothing)
+    else:
+        values, gradients, hessians = initial[0] * scale, initial[1], initial[2] / scale
     for _ in range(_STEPS):
         moves, slopes, sines = _newton_moves(normals, basis, points, gradients, hessians)
         lengths = np.sqrt((moves * moves).sum(axis=0) / (points * points).sum(axis=0))

@@ -18,8 +18,8 @@ from limit_surface_ros.surface.scaling import Scaling
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
 
-# Elements of one array of points by motions that fit the processor's cache together with others.
-_ELEMENTS = 2**15
+# Points times motions in one block.
+_ELEMENTS = 2**18
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,4 +105,4 @@ class PointContacts(DissipationSurface):
 
     @property
     def _block_columns(self) -> int:
-        return max(16, _ELEMENTS // len(self.points))
+        return max(64, min(4096, _ELEMENTS // len(self.points)))

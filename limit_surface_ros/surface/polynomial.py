@@ -89,6 +89,10 @@ class Polynomial(ScaledSurface):
         columns = np.moveaxis(as_vectors("load", load), -1, 0)
         return np.asarray(np.moveaxis(self._gradient(columns)[0], 0, -1))
 
+    def values(self, loads: Floats) -> Floats:
+        """Return the gauge P^(1/4) (m,) of scaled loads (3, m); see `plane_minimum.Gauge`."""
+        return self._load_factors(loads)
+
     def derivatives(self, loads: Floats, _smoothing: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the gauge P^(1/4) of scaled loads (3, m); see `plane_minimum.Gauge`."""
         gradient, hessian = self._gradient(loads)
@@ -136,6 +140,9 @@ class _Framed:
     def __init__(self, polynomial: Polynomial, frame: Floats) -> None:
         self._polynomial = polynomial
         self._frame = frame
+
+    def values(self, points: Floats) -> Floats:
+        return self._polynomial.values(self._frame @ points)
 
     def derivatives(self, points: Floats, smoothing: Floats) -> tuple[Floats, Floats, Floats]:
         gauge, gradient, hessian = self._polynomial.derivatives(self._frame @ points, smoothing)

@@ -23,6 +23,11 @@ class PowerGauge:
         self._sizes = np.trace(self._forms, axis1=1, axis2=2)[:, np.newaxis]
         self._exponents = exponents
 
+    def values(self, loads: Floats) -> Floats:
+        """Return g (m,)."""
+        images = self._roots @ loads
+        return np.exp(-log_scales(np.einsum("kcm,kcm->km", images, images), self._exponents))
+
     def derivatives(self, loads: Floats, smoothing: Floats) -> tuple[Floats, Floats, Floats]:
         """Return g, its gradient and its Hessian; see `plane_minimum.Gauge`.
 
