@@ -1,15 +1,14 @@
 """Decay models: the figures of the thesis, and the peers they are held against.
 
-Each table gives the goal beside what was measured here; times are the best of several runs,
-interleaved with the peer's where there is one.
+Each table gives the goal beside what was measured here; times are medians, interleaved with the
+peer's where there is one.
 """
 
 from __future__ import annotations
 
 import sys
-import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from decimal import Decimal, localcontext
 from pathlib import Path
 
@@ -18,6 +17,8 @@ from scipy.optimize import linprog
 from scipy.special import lambertw
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from interleaved import interleaved
 
 from limit_surface_ros.decay import examples
 from limit_surface_ros.decay.coefficient_fits import fit_coefficients
@@ -43,17 +44,6 @@ def table(title: str, headings: Sequence[str], rows: Sequence[Sequence[object]])
     for row in (headings, ["---"] * len(headings), *rows):
         print(f"| {' | '.join(str(cell) for cell in row)} |")
     print(flush=True)
-
-
-def best_times(functions: Sequence[Callable[[], object]], repeats: int = 7) -> list[float]:
-    """Return the least time of each function [s], all run in turn."""
-    best = [np.inf] * len(functions)
-    for _ in range(repeats):
-        for i, function in enumerate(functions):
-            start = time.perf_counter()
-            function()
-            best[i] = min(best[i], time.perf_counter() - start)
-    return best
 
 
 def sampled_system() -> DelaySystem:
@@ -118,7 +108,7 @@ def roots_found() -> None:
         found = roots_in_box(system, *box)
         value, slope = system.characteristic_and_derivative(found)
         missing = count_roots(system, *box) - len(found) - np.count_nonzero(found.imag)
-        (seconds,) = best_times([lambda s=system: roots_in_box(s, *box)])
+        seconds = interleaved({"ours": lambda s=system: roots_in_box(s, *box)})["ours"]
         residual = f"{np.abs(value / slope).max():.0e}"
         rows.append((name, goal, len(found), missing, residual, f"{seconds:.3f}", "< 0.3"))
     table(
@@ -147,7 +137,8 @@ def roots_found() -> None:
         return roots_in_box(system, region[:2], region[2:])
 
     difference = np.abs(np.sort_complex(peer()) - np.sort_complex(ours())).max()
-    seconds, peer_seconds = best_times([ours, peer], 3)
+    times = interleaved({"ours": ours, "qpmr": peer})
+    seconds, peer_seconds = times["ours"], times["qpmr"]
     print(
         f"s + exp(-s), from qpmr's literature list: roots agree to {difference:.0e}; ours "
         f"{seconds * 1e3:.1f} ms, qpmr {peer_seconds * 1e3:.0f} ms "
@@ -178,8 +169,11 @@ def memory_kernels() -> None:
     short_x, long_x = target(TIMES), target(long)
     kernel = memory_kernel(TIMES, short_x)
     error = np.abs(kernel.values - kernel_in_40_digits(short_x, kernel.step)).max()
-    short, slow = best_times(
-        [lambda: memory_kernel(TIMES, short_x), lambda: memory_kernel(long, long_x)]
+    times = interleaved(
+        {
+            "short": lambda: memory_kernel(TIMES, short_x),
+            "long": lambda: memory_kernel(long, long_x),
+        }
     )
     impulses = find_impulses(kernel)
     deviation = np.abs(impulses.strengths - [-1.0, 1.0]).max()
@@ -188,8 +182,8 @@ def memory_kernels() -> None:
         ("what", "measured", "goal"),
         [
             ("n = 2000, against 40 digits", f"{error:.1e}", "1e-12"),
-            ("n = 2000, time", f"{short * 1e3:.2f} ms", "< 1 ms"),
-            ("n = 100 000, time", f"{slow:.3f} s", "< 0.5 s"),
+            ("n = 2000, time", f"{times['short'] * 1e3:.2f} ms", "< 1 ms"),
+            ("n = 100 000, time", f"{times['long']:.3f} s", "< 0.5 s"),
             ("impulses, n = 2000", f"{deviation:.1e}", "1e-3"),
         ],
     )
@@ -213,18 +207,21 @@ def minimax_solvers() -> None:
     def whitened() -> float:
         return highs(orthonormal_basis(matrix).columns)
 
-    def ours() -> object:
-        return solve_minimax(matrix, target)
+    def ours() -> float:
+        return solve_minimax(matrix, target).value
 
-    seconds = best_times([ours, lambda: highs(matrix), whitened], 3)
-    values = [solve_minimax(matrix, target).value, highs(matrix), whitened()]
-    names = ("ours", "HiGHS", "HiGHS on our orthonormal basis")
+    solvers = {
+        "ours": ours,
+        "HiGHS": lambda: highs(matrix),
+        "HiGHS on our orthonormal basis": whitened,
+    }
+    times = interleaved(solvers, rounds=3)
     table(
         "Infinity-norm fit, 123 terms x 2000 points (goal: < 0.2 s, not slower than HiGHS)",
         ("solver", "value", "time [s]", "times ours"),
         [
-            (name, f"{value:.7e}", f"{second:.3f}", f"{second / seconds[0]:.1f}")
-            for name, value, second in zip(names, values, seconds, strict=True)
+            (name, f"{solve():.7e}", f"{times[name]:.3f}", f"{times[name] / times['ours']:.1f}")
+            for name, solve in solvers.items()
         ],
     )
 

@@ -1,19 +1,21 @@
 """Decay models and their files.
 
-schema: 1
-kind: exponential_sum
-name: hockey_stick
-rates: [[-2.05, 0.51], ...]        # [re, im] [1/s], one of each conjugate pair (im >= 0)
-coefficients: [[0.31, -0.2], ...]  # x(t) = Re sum c exp(lambda t)
-time_span: [0.0, 6.0]              # [s], where the error was measured
-norm: inf
-max_error: 0.0282                  # in the unit of x
-system:                            # optional: the delay system whose roots the rates are
-  delays: [0.0, 1.0]
-  strengths: [-1.0, 1.0]
-  edges: [0.0, 1.0, ...]           # optional: the distributed feedback
-  legendre: [[...], ...]           # one row for each cell
-fit: {...}                         # optional: how the model came about
+A file is YAML::
+
+    schema: 1
+    kind: exponential_sum
+    name: hockey_stick
+    fit: {...}                         # optional: how the model came about
+    system:                            # optional: the delay system whose roots the rates are
+      delays: [0.0, 1.0]               # [s]
+      strengths: [-1.0, 1.0]           # [1/s]
+      edges: [0.0, 1.0, ...]           # optional: the distributed feedback's cells [s]
+      legendre: [[...], ...]           # one row of coefficients for each cell
+    time_span: [0.0, 6.0]              # [s], where the error was measured
+    norm: inf
+    max_error: 0.0282                  # in the unit of x
+    rates: [[-2.05, 0.51], ...]        # [re, im] [1/s], one of each conjugate pair (im >= 0)
+    coefficients: [[0.31, -0.2], ...]  # x(t) = Re sum c exp(lambda t)
 """
 
 from __future__ import annotations
@@ -121,20 +123,19 @@ def write_decay_model(model: DecayModel, path: str | Path, header: str = "") -> 
     Raises:
         FileError: The file cannot be written.
     """
-    values: dict[str, Any] = {
-        "schema": SCHEMA,
-        "kind": KIND,
-        "name": model.name,
-        "rates": _rows(model.sum.rates),
-        "coefficients": _rows(model.sum.coefficients),
+    values: dict[str, Any] = {"schema": SCHEMA, "kind": KIND, "name": model.name}
+    if model.fit:
+        values["fit"] = dict(model.fit)
+    if model.system is not None:
+        values["system"] = _system_values(model.system)
+    # Last, and as long as each other: a file that was cut short anywhere is refused.
+    values |= {
         "time_span": list(model.time_span),
         "norm": model.norm,
         "max_error": model.max_error,
+        "rates": _rows(model.sum.rates),
+        "coefficients": _rows(model.sum.coefficients),
     }
-    if model.system is not None:
-        values["system"] = _system_values(model.system)
-    if model.fit:
-        values["fit"] = dict(model.fit)
     write_yaml(path, values, header)
 
 

@@ -54,6 +54,17 @@ def test_the_delay_system_behind_a_model_comes_back_too(tmp_path):
     np.testing.assert_array_equal(system.pieces.coefficients, pieces.coefficients)
 
 
+def test_a_file_cut_short_anywhere_is_refused(tmp_path):
+    pieces = PiecewisePolynomial([0.0, 1.0], [[1.0, 2.0]])
+    whole = tmp_path / "model.yaml"
+    write_decay_model(a_model(system=DelaySystem([1.0], [-1.0], pieces)), whole, "a header")
+    text, cut = whole.read_text(), tmp_path / "cut.yaml"
+    for length in range(len(text.rstrip())):
+        cut.write_text(text[:length])
+        with pytest.raises(FileError):
+            read_decay_model(cut)
+
+
 GOOD = {
     "schema": "1",
     "kind": "exponential_sum",

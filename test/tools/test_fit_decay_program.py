@@ -1,6 +1,7 @@
 """fit_decay and compare_decays: from an example or a record to a model file and a table."""
 
 import re
+import sys
 
 import numpy as np
 import pytest
@@ -196,3 +197,9 @@ def test_help_teaches_with_examples(program, capsys):
         program.main(["--help"])
     assert exit_code.value.code == 0
     assert "examples:" in capsys.readouterr().out
+
+
+def test_without_rosbags_the_extra_is_named(tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
+    assert fit_decay.main([str(tmp_path), "--topic", "/x", "-n", "1"]) == 2
+    assert "limit_surface_ros[bags]" in capsys.readouterr().err
