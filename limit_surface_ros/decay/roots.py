@@ -136,7 +136,11 @@ def rightmost_roots(system: DelaySystem, count: int) -> Complexes:
         edge -= 3.0 / system.max_delay
         high = system.root_bound(edge) * 1.001
         # A root pair counts twice and a real root once: half the count is a safe first look.
-        if count_roots(system, (edge, right), (0.0, high)) < count:
+        try:
+            enough = count_roots(system, (edge, right), (0.0, high)) >= count
+        except SolverError:  # A root on this edge is inside of the next.
+            continue
+        if not enough:
             continue
         roots = roots_in_box(system, (edge, right), (0.0, high))
         if len(roots) >= count:
