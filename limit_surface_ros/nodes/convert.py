@@ -8,12 +8,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.errors import NotFiniteError, RangeError, ShapeError
+from limit_surface_ros.errors import (
+    LimitSurfaceError,
+    NotFiniteError,
+    RangeError,
+    ShapeError,
+    ZeroVectorError,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from geometry_msgs.msg import Twist, Wrench
+    from geometry_msgs.msg import Point, Twist, Vector3, Wrench
 
     from limit_surface_ros.checks import Floats
 
@@ -46,6 +52,27 @@ def twist_components(twist: Twist) -> tuple[float, ...]:
     return _checked((linear.x, linear.y, linear.z, angular.x, angular.y, angular.z), _TWIST)
 
 
+def vector_components(name: str, vector: Vector3 | Point) -> tuple[float, ...]:
+    """Return (x, y, z) of a message.
+
+    Raises:
+        NotFiniteError: A component is NaN or infinite.
+        RangeError: A component is larger than `LARGEST`.
+    """
+    names = (f"{name}.x", f"{name}.y", f"{name}.z")
+    return _checked((vector.x, vector.y, vector.z), names)
+
+
+def checked_number(name: str, value: float) -> float:
+    """Return a number of a message.
+
+    Raises:
+        NotFiniteError: It is NaN or infinite.
+        RangeError: It is larger than `LARGEST`.
+    """
+    return _checked((value,), (name,))[0]
+
+
 def _checked(values: tuple[float, ...], names: tuple[str, ...]) -> tuple[float, ...]:
     # One comparison for the usual case; NaN fails it.
     if sum(map(abs, values)) <= LARGEST:
@@ -73,8 +100,9 @@ def rows_of(name: str, numbers: array[float]) -> Floats:
 
     Raises:
         ShapeError: The length is no multiple of three.
-        NotFiniteError: A number is NaN or infinite; the error names the first such row.
-        RangeError: A number is larger than `LARGEST`; the error names the first such row.
+        NotFiniteError: A number is NaN or infinite.
+        RangeError: A row is beyond `LARGEST` or below `SMALLEST` in size.
+        ZeroVectorError: A row is zero; all these errors name the first bad row.
     """
     flat = np.frombuffer(numbers, dtype=np.float64) if len(numbers) else np.empty(0)
     if flat.size % 3:
@@ -82,14 +110,22 @@ def rows_of(name: str, numbers: array[float]) -> Floats:
             f"{name} must hold 3 numbers a row, row after row; {flat.size} is no multiple of 3"
         )
     rows = flat.reshape(-1, 3)
-    fits = np.abs(rows) <= LARGEST
+    sizes = np.abs(rows).max(axis=1)
+    # NaN fails both comparisons.
+    fits = (sizes >= SMALLEST) & (sizes <= LARGEST)
     if not fits.all():
-        row, column = (int(i) for i in np.argwhere(~fits)[0])
-        value = rows[row, column]
-        if np.isfinite(value):
-            raise RangeError(f"{name} row {row} must be at most {LARGEST:g}, got {value:g}")
-        raise NotFiniteError(f"{name} row {row} must be finite, got {rows[row].tolist()}")
+        row = int(np.argmin(fits))
+        raise _bad_row(f"{name} row {row}", rows[row].tolist())
     return rows
+
+
+def _bad_row(where: str, row: list[float]) -> LimitSurfaceError:
+    """Return what is wrong with a row."""
+    if not np.isfinite(row).all():
+        return NotFiniteError(f"{where} must be finite, got {row}")
+    if not any(row):
+        return ZeroVectorError(f"{where} must not be zero: it has no direction")
+    return RangeError(f"{where} must be within {SMALLEST:g} and {LARGEST:g} in size, got {row}")
 
 
 def flat_of(values: Floats) -> array[float]:

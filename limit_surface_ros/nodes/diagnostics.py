@@ -1,4 +1,4 @@
-"""A node's health on /diagnostics, once a second."""
+"""A node's health on /diagnostics, once a second if not asked otherwise."""
 
 from __future__ import annotations
 
@@ -7,14 +7,34 @@ from typing import TYPE_CHECKING
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 
+from limit_surface_ros.nodes.settings import Setting
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from rclpy.node import Node
 
     from limit_surface_ros.nodes.health import Health
+    from limit_surface_ros.nodes.parameters import Parameters
 
-PERIOD = 1.0
+SETTINGS = (
+    Setting(
+        "input_timeout",
+        0.5,
+        "Longest silence of a topic input in node time before it is reported as stale [s]; "
+        "0: never",
+        minimum=0.0,
+        maximum=1e6,
+    ),
+    Setting(
+        "diagnostics_period",
+        1.0,
+        "Time between two messages on /diagnostics [s]",
+        minimum=0.01,
+        maximum=60.0,
+        read_only=True,
+    ),
+)
 
 
 class Diagnostics:
@@ -24,26 +44,27 @@ class Diagnostics:
 
     Args:
         node: The node.
+        parameters: Its parameters, which include `SETTINGS`.
         health: What it has seen.
         describe: Further values, by key.
-        timeout: Longest silence [s] of an input before it is stale; 0: none is too long.
     """
 
     def __init__(
         self,
         node: Node,
+        parameters: Parameters,
         health: Health,
         describe: Callable[[], Mapping[str, str]],
-        timeout: Callable[[], float],
     ) -> None:
         """Start the timer."""
         self._node = node
         self._health = health
         self._describe = describe
-        self._timeout = timeout
+        self._parameters = parameters
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(PERIOD, self._publish, clock=steady)
+        period = parameters["diagnostics_period"]
+        self._timer = node.create_timer(period, self._publish, clock=steady)
 
     def _publish(self) -> None:
         message = DiagnosticArray(status=[self._status()])
@@ -54,7 +75,7 @@ class Diagnostics:
     def _status(self) -> DiagnosticStatus:
         health = self._health
         now = self._node.get_clock().now().nanoseconds
-        stale = health.stale(now, self._timeout())
+        stale = health.stale(now, self._parameters["input_timeout"])
         level, summary = DiagnosticStatus.OK, "serving"
         if stale:
             level, summary = DiagnosticStatus.STALE, f"no input on {', '.join(stale)}"

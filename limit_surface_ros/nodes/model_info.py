@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import TYPE_CHECKING
 
@@ -9,13 +10,20 @@ import yaml
 from limit_surface_interfaces.msg import ModelInfo
 
 from limit_surface_ros.files.yaml_reader import plain
-from limit_surface_ros.surface.convexity import is_convex_by_construction
+from limit_surface_ros.surface.convexity import is_convex
 
 if TYPE_CHECKING:
     from limit_surface_ros.files.surface_file import SurfaceModel
+    from limit_surface_ros.surface.protocol import LimitSurface
 
 # What counts the terms of a kind, by the attribute that holds them.
 _TERMS = ("matrices", "points", "coefficients")
+
+
+# Where no theorem decides, thousands of directions are looked at: once for each surface.
+@functools.lru_cache(maxsize=64)
+def _is_convex(surface: LimitSurface) -> bool:
+    return is_convex(surface).convex
 
 
 def model_info(model: SurfaceModel, is_default: bool) -> ModelInfo:
@@ -32,6 +40,6 @@ def model_info(model: SurfaceModel, is_default: bool) -> ModelInfo:
         friction_force=scaling.friction_force,
         normal_force=math.nan if model.normal_force is None else model.normal_force,
         is_default=is_default,
-        convex=is_convex_by_construction(surface),
+        convex=_is_convex(surface),
         fit=yaml.safe_dump(plain(dict(model.fit)), sort_keys=False) if model.fit else "",
     )

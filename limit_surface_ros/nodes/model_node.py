@@ -20,12 +20,10 @@ from std_srvs.srv import Trigger
 
 from limit_surface_ros.errors import LimitSurfaceError
 from limit_surface_ros.files.model_set import Model, Named
-from limit_surface_ros.nodes import answers, spin
-from limit_surface_ros.nodes.diagnostics import Diagnostics
+from limit_surface_ros.nodes import answers, diagnostics, spin
 from limit_surface_ros.nodes.health import Health, InputAge
 from limit_surface_ros.nodes.model_host import ModelHost
 from limit_surface_ros.nodes.parameters import Parameters
-from limit_surface_ros.nodes.settings import Setting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -33,22 +31,14 @@ if TYPE_CHECKING:
 
     from rclpy.publisher import Publisher
 
+    from limit_surface_ros.nodes.settings import Setting
+
 # Models of a second kind.
 Model2 = TypeVar("Model2", bound=Named)
 
 LOG_PERIOD = 5.0
 DEPTH = 10
-COMMON_SETTINGS = (
-    Setting(
-        "input_timeout",
-        0.5,
-        "Longest silence of a topic input in node time before it is reported as stale [s]; "
-        "0: never",
-        minimum=0.0,
-        maximum=1e6,
-    ),
-    spin.EXECUTOR,
-)
+COMMON_SETTINGS = (*diagnostics.SETTINGS, spin.EXECUTOR)
 
 
 class ModelNode(Node, Generic[Model]):
@@ -88,9 +78,7 @@ class ModelNode(Node, Generic[Model]):
             raise
         self.health = Health()
         self.create_service(Trigger, "~/reload", self._reload)
-        self._diagnostics = Diagnostics(
-            self, self.health, self.describe, lambda: self.values["input_timeout"]
-        )
+        self._diagnostics = diagnostics.Diagnostics(self, self.values, self.health, self.describe)
         self.get_logger().info(self.models.summary)
 
     def describe(self) -> dict[str, str]:

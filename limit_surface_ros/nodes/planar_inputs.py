@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from geometry_msgs.msg import TwistStamped, WrenchStamped
+    from limit_surface_interfaces.srv import Push
     from std_msgs.msg import Header
 
     from limit_surface_ros.checks import Floats
@@ -61,6 +62,22 @@ class Planar(NamedTuple):
 
     surface: LimitSurface
     vector: Floats
+
+
+class Contact(NamedTuple):
+    """A pusher's contact in the plane of a model, about its reference point.
+
+    Attributes:
+        point: (x, y) [m].
+        normal: Pointing into the body.
+        friction: Coefficient between pusher and body.
+        velocity: Of the pusher [m/s].
+    """
+
+    point: Sequence[float]
+    normal: Sequence[float]
+    friction: float
+    velocity: Sequence[float]
 
 
 class PlanarInputs:
@@ -112,6 +129,25 @@ class PlanarInputs:
         length = model.surface.scaling.characteristic_length
         self._look_out_of_plane("twist", out_of_plane(six, length))
         return Planar(self._surface(model, None), _vector("twist", six))
+
+    def contact(self, model: SurfaceModel, request: Push.Request) -> Contact:
+        """Return a contact and the pusher's velocity there, in the model's plane.
+
+        Raises:
+            NotFiniteError: A number is NaN or infinite.
+            RangeError: A number is out of this world.
+            FrameError: The frame is empty or no transform to the model's is known.
+        """
+        point = convert.vector_components("contact", request.contact.point)
+        normal = convert.vector_components("normal", request.normal)
+        velocity = convert.vector_components("velocity", request.velocity)
+        transform = self._to_reference(model, request.contact.header)
+        if transform is not None:
+            point = transform.point(point).tolist()
+            normal = transform.direction(normal).tolist()
+            velocity = transform.direction(velocity).tolist()
+        friction = convert.checked_number("friction", request.friction)
+        return Contact(point[:2], normal[:2], friction, velocity[:2])
 
     def surface(self, model: SurfaceModel) -> LimitSurface:
         """Return a model's surface where no wrench says how hard the body is pressed."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from typing import TYPE_CHECKING, Any
 
 import rclpy
@@ -12,8 +13,15 @@ if TYPE_CHECKING:
     from types import TracebackType
 
 
+# A server that has not discovered this client's side yet drops its answer (rmw_fastrtps): ask
+# again after so long [s].
+AGAIN = 2.0
+
+
 class ServiceClient:
     """A client node of its own; use it in a `with` block, which ends its thread.
+
+    Calls may be repeated, so that only services that change nothing should be called.
 
     Args:
         name: Name of the node.
@@ -58,10 +66,12 @@ class ServiceClient:
             if not client.wait_for_service(timeout_sec=timeout):
                 raise TimeoutError(f"there is no service {name} after {timeout:g} s")
             self._clients[name] = client
-        answered = threading.Event()
-        future = client.call_async(request)
-        future.add_done_callback(lambda _: answered.set())
-        if not answered.wait(timeout):
+        end = time.monotonic() + timeout
+        while (left := end - time.monotonic()) > 0.0:
+            answered = threading.Event()
+            future = client.call_async(request)
+            future.add_done_callback(lambda _, event=answered: event.set())
+            if answered.wait(min(left, AGAIN)):
+                return future.result()
             client.remove_pending_request(future)
-            raise TimeoutError(f"service {name} did not answer within {timeout:g} s")
-        return future.result()
+        raise TimeoutError(f"service {name} did not answer within {timeout:g} s")

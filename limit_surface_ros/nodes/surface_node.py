@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from geometry_msgs.msg import TwistStamped, WrenchStamped
 from limit_surface_interfaces.srv import (
     ListModels,
+    Push,
     TwistsToWrenches,
     TwistToWrench,
     WrenchesToTwists,
@@ -21,6 +22,7 @@ from limit_surface_ros.nodes.model_node import ModelNode
 from limit_surface_ros.nodes.planar_inputs import PlanarInputs
 from limit_surface_ros.nodes.surface_markers import SurfaceMarkers
 from limit_surface_ros.surface.planar import power
+from limit_surface_ros.surface.pushing import push
 
 if TYPE_CHECKING:
     from std_msgs.msg import Header
@@ -58,6 +60,7 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
         self.add_service(TwistToWrench, "twist_to_wrench", self._twist_to_wrench)
         self.add_service(WrenchesToTwists, "wrenches_to_twists", self._wrenches_to_twists)
         self.add_service(TwistsToWrenches, "twists_to_wrenches", self._twists_to_wrenches)
+        self.add_service(Push, "push", self._push)
         self.add_service(ListModels, "list_models", self._list_models)
         self.add_input(WrenchStamped, "wrench", self._predict)
         self.add_input(TwistStamped, "twist", self._require)
@@ -108,6 +111,16 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
         wrenches = surface.wrench_of_twist(twists)
         response.wrenches = convert.flat_of(wrenches)
         response.powers = convert.flat_of(power(wrenches, twists))
+
+    def _push(self, request: Push.Request, response: Push.Response) -> None:
+        model = self.models[request.model]
+        contact = self._inputs.contact(model, request)
+        pushed = push(self._inputs.surface(model), *contact)
+        convert.fill_twist(response.twist.twist, pushed.twist)
+        convert.fill_wrench(response.wrench.wrench, pushed.wrench)
+        response.mode = pushed.mode.value
+        for stamped in (response.twist, response.wrench):
+            _head(stamped.header, request.contact.header, model)
 
     def _list_models(self, _: ListModels.Request, response: ListModels.Response) -> None:
         default = self.models.models.default

@@ -92,6 +92,22 @@ class RigidTransform:
             self.rotation @ first.rotation, self.rotation @ first.translation + self.translation
         )
 
+    def point(self, point: ArrayLike) -> Floats:
+        """Return the same place in the target frame: R p + t, shape (3,) [m].
+
+        Raises:
+            NotFiniteError: A coordinate is NaN or infinite.
+        """
+        return self.direction(point) + self.translation
+
+    def direction(self, vector: ArrayLike) -> Floats:
+        """Return the same direction, or velocity of a point, in the target frame: R v, shape (3,).
+
+        Raises:
+            NotFiniteError: A component is NaN or infinite.
+        """
+        return np.asarray(self.rotation @ as_floats("vector", vector))
+
     def wrench(self, wrench: ArrayLike) -> Floats:
         """Return the same load in the target frame: f' = R f, tau' = R tau + t x f'.
 

@@ -77,14 +77,23 @@ class Spinner:
         """Return a function that calls a service and waits for the answer."""
         client = node.create_client(service_type, name)
         assert client.wait_for_service(timeout_sec=WAIT), f"no service {name}"
-        return lambda request, timeout=WAIT: self.result(client.call_async(request), timeout)
 
-    def result(self, future, timeout=WAIT):
-        """Wait for a future, outside the executor's thread, and return its result."""
+        def call(request, timeout=WAIT):
+            # Under load a server may drop an answer to a client that it has not discovered yet.
+            for _ in range(3):
+                future = client.call_async(request)
+                if self.done(future, timeout / 3):
+                    return future.result()
+                client.remove_pending_request(future)
+            raise AssertionError(f"no answer from {name}")
+
+        return call
+
+    def done(self, future, timeout):
+        """Wait for a future, outside the executor's thread."""
         done = threading.Event()
         future.add_done_callback(lambda _: done.set())
-        assert done.wait(timeout), "no answer"
-        return future.result()
+        return done.wait(timeout)
 
     def listen(self, node, message_type, topic, qos=10):
         """Subscribe and return the list that the messages are put in; see `wait`."""

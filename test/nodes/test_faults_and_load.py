@@ -1,0 +1,272 @@
+"""Whatever is sent, each service answers with a code and no input ends or fills the node."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from array import array
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
+
+from geometry_msgs.msg import TwistStamped, WrenchStamped
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from limit_surface_interfaces.msg import ErrorCode
+from limit_surface_interfaces.srv import (
+    ListModels,
+    Push,
+    TwistsToWrenches,
+    TwistToWrench,
+    WrenchesToTwists,
+    WrenchToTwist,
+)
+from rclpy.serialization import serialize_message
+
+from limit_surface_ros.nodes import convert
+from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
+from node_helpers import Program, planar_twist, wrench_message
+
+CODES = {
+    ErrorCode.NONE,
+    ErrorCode.NOT_FINITE,
+    ErrorCode.ZERO_VECTOR,
+    ErrorCode.BAD_SHAPE,
+    ErrorCode.OUT_OF_RANGE,
+    ErrorCode.UNKNOWN_MODEL,
+    ErrorCode.UNKNOWN_FRAME,
+    ErrorCode.NO_CONVERGENCE,
+}
+numbers = st.floats(width=64) | st.sampled_from([0.0, 1e308, -1e308, 5e-324, 1e-310, 1.0, -1.0])
+texts = st.sampled_from(["", "object", "box", "tool", "x" * 100_000]) | st.text(
+    st.characters(blacklist_categories=["Cs"], blacklist_characters="\x00"), max_size=20
+)
+sixes = st.lists(numbers, min_size=6, max_size=6)
+flats = st.lists(numbers, max_size=12).map(lambda values: array("d", values))
+many = settings(
+    max_examples=60,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+    deadline=None,
+)
+
+
+@st.composite
+def wrenches(draw):
+    message = WrenchStamped()
+    message.header.frame_id = draw(texts)
+    force, torque = message.wrench.force, message.wrench.torque
+    force.x, force.y, force.z, torque.x, torque.y, torque.z = draw(sixes)
+    return message
+
+
+@st.composite
+def twists(draw):
+    message = TwistStamped()
+    message.header.frame_id = draw(texts)
+    linear, angular = message.twist.linear, message.twist.angular
+    linear.x, linear.y, linear.z, angular.x, angular.y, angular.z = draw(sixes)
+    return message
+
+
+@st.composite
+def pushes(draw):
+    asked = Push.Request(model=draw(texts), friction=draw(numbers))
+    asked.contact.header.frame_id = draw(texts)
+    for vector in (asked.contact.point, asked.normal, asked.velocity):
+        vector.x, vector.y, vector.z = draw(numbers), draw(numbers), draw(numbers)
+    return asked
+
+
+REQUESTS = {
+    "wrench_to_twist": (
+        WrenchToTwist,
+        st.builds(WrenchToTwist.Request, model=texts, wrench=wrenches()),
+    ),
+    "twist_to_wrench": (
+        TwistToWrench,
+        st.builds(TwistToWrench.Request, model=texts, twist=twists()),
+    ),
+    "wrenches_to_twists": (
+        WrenchesToTwists,
+        st.builds(WrenchesToTwists.Request, model=texts, wrenches=flats),
+    ),
+    "twists_to_wrenches": (
+        TwistsToWrenches,
+        st.builds(TwistsToWrenches.Request, model=texts, twists=flats),
+    ),
+    "push": (Push, pushes()),
+    "list_models": (ListModels, st.builds(ListModels.Request)),
+}
+MODES = [
+    {},
+    {"assume_model_frame": True, "static_transforms": ["object tool 1 2 3 0.1 0.2 0.3"]},
+    {"normal_force_from": "wrench"},
+]
+
+
+@pytest.fixture(params=MODES, ids=["plain", "frames", "pressed"])
+def fuzzed(ros, client_node, model_file, request):
+    _, path = model_file(normal_force=10.0)
+    return ros.add(LimitSurfaceNode, files=[path], parameters=request.param)
+
+
+@pytest.mark.parametrize("name", REQUESTS)
+def test_every_request_gets_a_code_that_explains_it(ros, client_node, fuzzed, name):
+    service_type, requests = REQUESTS[name]
+    call = ros.client(client_node, service_type, f"/limit_surface/{name}")
+
+    @many
+    @given(request=requests)
+    def check(request):
+        answer = call(request)
+        assert answer.error_code in CODES, answer.error_msg
+        assert bool(answer.error_msg) == (answer.error_code != ErrorCode.NONE)
+        if answer.error_code == ErrorCode.NONE and name == "wrench_to_twist":
+            assert np.isfinite([*planar_twist(answer.twist), answer.load_factor]).all()
+
+    check()
+
+
+@pytest.mark.parametrize(
+    ("topic", "answered", "kind", "messages"),
+    [
+        ("wrench", "predicted_twist", TwistStamped, wrenches()),
+        ("twist", "required_wrench", WrenchStamped, twists()),
+    ],
+)
+def test_every_message_is_answered_or_counted(
+    ros, client_node, fuzzed, topic, answered, kind, messages
+):
+    answers = ros.listen(client_node, kind, f"/limit_surface/{answered}")
+    sent_kind = {TwistStamped: WrenchStamped, WrenchStamped: TwistStamped}[kind]
+    publisher = client_node.create_publisher(sent_kind, f"/limit_surface/{topic}", 10)
+    ros.matched(publisher)
+    ros.wait(lambda: client_node.count_publishers(f"/limit_surface/{answered}") == 1)
+    health = fuzzed.health
+
+    def handled():
+        return health.accepted[topic] + sum(
+            count for (where, _), count in health.refused.items() if where == topic
+        )
+
+    @many
+    @given(message=messages)
+    def check(message):
+        before = handled()
+        publisher.publish(message)
+        ros.wait(lambda: handled() == before + 1)
+
+    check()
+    assert not [code for _, code in health.refused if code == "INTERNAL"], health.last_error
+    for answer in answers:
+        part = answer.twist if kind is TwistStamped else answer.wrench
+        assert np.isfinite([part.linear.x if kind is TwistStamped else part.force.x]).all()
+
+
+def test_ten_clients_at_once_get_their_own_answers(ros, client_node, model_file):
+    model, path = model_file()
+    ros.add(LimitSurfaceNode, files=[path])
+    clients = [
+        ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist") for _ in range(10)
+    ]
+    wrong = []
+
+    def ask(index, call):
+        rng = np.random.default_rng(index)
+        for wrench in rng.normal(size=(20, 3)):
+            answer = call(WrenchToTwist.Request(wrench=wrench_message(wrench)))
+            if not np.allclose(planar_twist(answer.twist), model.surface.twist_of_wrench(wrench)):
+                wrong.append((index, wrench))
+
+    threads = [threading.Thread(target=ask, args=item) for item in enumerate(clients)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong
+
+
+def test_a_client_that_dies_in_the_middle_of_a_call_harms_nobody(ros, client_node, model_file):
+    import rclpy
+
+    _, path = model_file()
+    flat = convert.flat_of(np.ones((20_000, 3)))
+    with Program("limit_surface_node", "--ros-args", "-p", f"model_files:=['{path}']") as program:
+        call = ros.client(client_node, WrenchesToTwists, "/limit_surface/wrenches_to_twists")
+        for _ in range(5):
+            dying = rclpy.create_node("dying", context=ros.context)
+            client = dying.create_client(WrenchesToTwists, "/limit_surface/wrenches_to_twists")
+            assert client.wait_for_service(timeout_sec=20.0)
+            client.call_async(WrenchesToTwists.Request(wrenches=flat))
+            dying.destroy_node()
+        assert call(WrenchesToTwists.Request(wrenches=flat)).error_code == ErrorCode.NONE
+        code, output = program.end()
+    assert code == 0, output
+
+
+def processor_ticks(pid: int) -> int:
+    """Return the processor time that a process has used, in user mode."""
+    return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11])
+
+
+def resident(pid: int) -> int:
+    """Return the resident memory of a process [kB]."""
+    status = Path(f"/proc/{pid}/status").read_text()
+    return int(status.partition("VmRSS:")[2].split()[0])
+
+
+def test_requests_of_a_million_rows_leave_no_memory_behind(ros, client_node, model_file):
+    _, path = model_file(terms=1)
+    with Program("limit_surface_node", "--ros-args", "-p", f"model_files:=['{path}']") as program:
+        call = ros.client(client_node, WrenchesToTwists, "/limit_surface/wrenches_to_twists")
+        flat = convert.flat_of(np.ones((1_000_000, 3)))
+        sizes = []
+        for _ in range(6):
+            answer = call(WrenchesToTwists.Request(wrenches=flat), timeout=60.0)
+            assert answer.error_code == ErrorCode.NONE
+            sizes.append(resident(program.process.pid))
+        code, output = program.end()
+    assert code == 0, output
+    # Buffers of the middleware are there after the first two; one answer holds 32 MB.
+    assert sizes[-1] - sizes[2] < 16_000
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_during_a_call_ends_the_node_cleanly(ros, client_node, model_file, number):
+    _, path = model_file()
+    with Program("limit_surface_node", "--ros-args", "-p", f"model_files:=['{path}']") as program:
+        name = "/limit_surface/wrenches_to_twists"
+        client = client_node.create_client(WrenchesToTwists, name)
+        assert client.wait_for_service(timeout_sec=20.0)
+        idle = processor_ticks(program.process.pid)
+        flat = convert.flat_of(np.ones((1_000_000, 3)))
+        client.call_async(WrenchesToTwists.Request(wrenches=flat))
+        ros.wait(lambda: processor_ticks(program.process.pid) > idle + 20)
+        code, output = program.end(number)
+    assert code == 0, output
+    assert "Traceback" not in output
+    assert "terminate" not in output
+
+
+def test_a_message_that_rclpy_cannot_read_does_not_end_the_node(ros, client_node, model_file):
+    _, path = model_file()
+    good = wrench_message([9.0, 0.0, 0.0], frame="object")
+    broken = serialize_message(good).replace(b"object", b"\xff\xfe\xff\xfe\xff\xfe")
+    assert broken != serialize_message(good)
+    with Program("limit_surface_node", "--ros-args", "-p", f"model_files:=['{path}']") as program:
+        twists_seen = ros.listen(client_node, TwistStamped, "/limit_surface/predicted_twist")
+        publisher = client_node.create_publisher(WrenchStamped, "/limit_surface/wrench", 10)
+        ros.matched(publisher)
+        ros.wait(lambda: client_node.count_publishers("/limit_surface/predicted_twist") == 1)
+        publisher.publish(broken)
+        call = ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
+        assert call(WrenchToTwist.Request(wrench=good)).error_code == ErrorCode.NONE
+        timer = client_node.create_timer(0.05, lambda: publisher.publish(good))
+        ros.wait(lambda: twists_seen)
+        timer.cancel()
+        code, output = program.end()
+    assert code == 0, output

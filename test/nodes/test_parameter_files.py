@@ -1,0 +1,32 @@
+"""The parameter files in config/ show each parameter at its default."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
+
+from limit_surface_ros.nodes.decay_node import SETTINGS as DECAY_SETTINGS
+from limit_surface_ros.nodes.model_node import COMMON_SETTINGS
+from limit_surface_ros.nodes.surface_node import SETTINGS as SURFACE_SETTINGS
+
+CONFIG = Path(__file__).parents[2] / "config"
+TABLES = {
+    "limit_surface": [*SURFACE_SETTINGS, *COMMON_SETTINGS],
+    "decay": [*DECAY_SETTINGS, *COMMON_SETTINGS],
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_each_parameter_is_shown_at_its_default(name):
+    text = (CONFIG / f"{name}.yaml").read_text()
+    given = yaml.safe_load(text)[f"/**/{name}"]["ros__parameters"]
+    table = {setting.name: setting.default for setting in TABLES[name]}
+    assert all(given[key] == table[key] for key in given)
+    # rcl cannot read empty lists: those, and lists of files, may stand in comments only.
+    hidden = set(table) - set(given)
+    assert all(isinstance(table[key], list) for key in hidden)

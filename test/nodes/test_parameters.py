@@ -1,0 +1,107 @@
+"""Parameters: described, validated when set, applied afterwards, all or none."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
+
+from rcl_interfaces.msg import ParameterType
+from rclpy.parameter import Parameter
+
+from limit_surface_ros.nodes.model_node import COMMON_SETTINGS
+from limit_surface_ros.nodes.surface_node import SETTINGS, LimitSurfaceNode
+
+TABLE = [*SETTINGS, *COMMON_SETTINGS]
+
+
+@pytest.fixture
+def node(ros, model_file):
+    return ros.add(LimitSurfaceNode, files=[model_file()[1]])
+
+
+@pytest.mark.parametrize("setting", TABLE, ids=lambda setting: setting.name)
+def test_every_parameter_is_described(node, setting):
+    descriptor = node.describe_parameter(setting.name)
+    assert descriptor.description == setting.description
+    assert descriptor.read_only == setting.read_only
+    assert descriptor.type != ParameterType.PARAMETER_NOT_SET
+    for choice in setting.choices:
+        assert choice in descriptor.additional_constraints
+    if setting.minimum is not None:
+        assert descriptor.floating_point_range[0].from_value == setting.minimum
+        assert descriptor.floating_point_range[0].to_value == setting.maximum
+
+
+@pytest.mark.parametrize("setting", TABLE, ids=lambda setting: setting.name)
+def test_every_parameter_starts_at_its_default(node, setting):
+    if setting.name != "model_files":
+        assert node.values[setting.name] == setting.default
+        value = node.get_parameter(setting.name).value
+        assert (list(value) if isinstance(setting.default, list) else value) == setting.default
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [
+        ("input_timeout", -1.0, "range"),
+        ("input_timeout", math.nan, "nan"),
+        ("normal_force", math.inf, "inf"),
+        ("normal_force", 0.0, "range"),
+        ("normal_force_from", "moon", "model, wrench, parameter"),
+        ("static_transforms", ["a b 1"], "accepted"),
+        ("static_transforms", ["a b 0 0 nan 0 0 0"], "finite"),
+        ("model_files", ["/nowhere.yaml"], "/nowhere.yaml"),
+        ("model_files", ["package://nowhere/models"], "nowhere"),
+        ("default_model", "sofa", "sofa"),
+        ("executor", "events", "read-only"),
+    ],
+)
+def test_a_bad_value_is_refused_and_the_old_one_stays(node, name, value, told):
+    before, used = node.get_parameter(name).value, node.values[name]
+    (result,) = node.set_parameters([Parameter(name, value=value)])
+    assert not result.successful
+    assert told in result.reason
+    assert node.get_parameter(name).value == before
+    assert node.values[name] == used
+
+
+def test_an_empty_list_of_models_is_refused(node):
+    empty = Parameter("model_files", Parameter.Type.STRING_ARRAY, [])
+    (result,) = node.set_parameters([empty])
+    assert not result.successful
+    assert "at least one" in result.reason
+
+
+def test_a_good_value_counts_at_once(node):
+    (result,) = node.set_parameters([Parameter("normal_force_from", value="parameter")])
+    assert result.successful
+    assert node.values["normal_force_from"] == "parameter"
+
+
+def test_of_a_set_with_one_bad_value_none_is_taken(node):
+    result = node.set_parameters_atomically(
+        [Parameter("normal_force", value=3.0), Parameter("default_model", value="sofa")]
+    )
+    assert not result.successful
+    assert node.values["normal_force"] == node.get_parameter("normal_force").value == 1.0
+    # Nor does the next good set bring the refused one back.
+    assert node.set_parameters_atomically([Parameter("input_timeout", value=2.0)]).successful
+    assert node.values["normal_force"] == 1.0
+    assert node.values["input_timeout"] == 2.0
+
+
+def test_simulated_time_can_be_switched_on_and_off(node):
+    for value in (True, False):
+        (result,) = node.set_parameters([Parameter("use_sim_time", value=value)])
+        assert result.successful, result.reason
+
+
+def test_the_quality_of_service_can_be_overridden(ros, model_file):
+    name = "qos_overrides./limit_surface/wrench.subscription.reliability"
+    node = ros.add(LimitSurfaceNode, files=[model_file()[1]], parameters={name: "reliable"})
+    subscription = next(s for s in node.subscriptions if s.topic_name == "/limit_surface/wrench")
+    assert subscription.qos_profile.reliability.name == "RELIABLE"
