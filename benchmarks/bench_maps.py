@@ -62,8 +62,9 @@ def batches_and_single_calls() -> None:
     print(f"### Both maps of each kind, one thread, batches of up to {BATCH}\n")
     print(
         "| kind | wrench -> twist [M/s] | goal | twist -> wrench [M/s] "
-        "| one wrench -> twist [us] | goal | one twist -> wrench [us] |\n|---|---|---|---|---|---|---|"
+        "| one wrench -> twist [us] | goal | one twist -> wrench [us] |"
     )
+    print("|---|---|---|---|---|---|---|")
     rng = np.random.default_rng(0)
     matrix = random_matrices(1)[0]
     for name, surface in kinds().items():

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from limit_surface_ros.checks import as_positive
 from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.yaml_reader import Section, place_errors, read_yaml, write_yaml
+from limit_surface_ros.surface.convexity import warn_unless_convex
 from limit_surface_ros.surface.dissipation import Dissipation
 from limit_surface_ros.surface.point_contacts import PointContacts
 from limit_surface_ros.surface.polynomial import Polynomial
@@ -104,7 +105,7 @@ _DEFINING = {
 
 
 def read_surface_model(path: str | Path) -> SurfaceModel:
-    """Read a surface model.
+    """Read a surface model; warn once if its surface is not convex.
 
     Raises:
         FileError: The file is no valid surface model; the message names file, key, what was found
@@ -129,6 +130,7 @@ def read_surface_model(path: str | Path) -> SurfaceModel:
         fit=history.values,
     )
     section.finish()
+    warn_unless_convex(surface, model.name)
     return model
 
 

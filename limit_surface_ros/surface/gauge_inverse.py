@@ -80,7 +80,7 @@ class ConvexInverse:
             SolverError: A point could not be certified.
         """
         units = normals / np.sqrt((normals * normals).sum(axis=0))
-        start = np.argmax(self._starts.T @ units, axis=0)
+        start = np.argmax(units.T @ self._starts, axis=1)
         points = self._starts[:, start]
         initial = np.ones(len(start)), self._gradients[:, start], self._hessians[:, :, start]
         smooth = np.arange(units.shape[1])
