@@ -19,6 +19,7 @@ EXTRAS = {
 # Each program's name and the module whose main() it runs.
 PROGRAMS: dict[str, str] = {
     "fit_catalogue": "limit_surface_ros.tools.fit_catalogue",
+    "compare_surfaces": "limit_surface_ros.tools.compare_surfaces",
     "fit_surface": "limit_surface_ros.tools.fit_surface",
     "fit_decay": "limit_surface_ros.tools.fit_decay",
     "compare_decays": "limit_surface_ros.tools.compare_decays",

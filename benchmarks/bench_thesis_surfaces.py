@@ -1,5 +1,6 @@
-"""Chapter 3 of the thesis: every model on three support points and on patches, beside the best
-figures known before.
+"""Chapter 3 of the thesis: every model on three support points and on patches.
+
+Each stands beside the best figures known before.
 
 Training: 2000 random motions, and 150 loads on each facet of the support points. Tests: 2000 fresh
 motions for v = |v - v^| of unit twists, 1000 unit loads for f, the model's load against the exact
@@ -15,6 +16,10 @@ for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_variable, "1")
 
 import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -20,12 +20,15 @@ from limit_surface_ros.tools.training_data import ACCEPTED
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from limit_surface_ros.fitting.result import Errors, FitResult
+    from limit_surface_ros.fitting.result import Errors
+    from limit_surface_ros.tools.surface_fit import FittedModel
 
 EXAMPLES = """examples:
   fit_surface contact.yaml --terms 3 --output model.yaml
   fit_surface pushes.csv --terms 2 --objective J2 --velocity-weight 0.5 --output model.yaml
-  fit_surface pushes.csv --rows 0-24 --family norms --output model.yaml
+  fit_surface pushes.csv --rows 0-24 --auto --support --output model.yaml
+  fit_surface contact.yaml --kind dissipation --terms 4 --output model.yaml
+  fit_surface pushes.mcap --wrench-topic wrench --motion-topic pose --auto --output model.yaml
 """
 
 
@@ -52,8 +55,12 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
-def report(result: FitResult, output: Path) -> None:
-    """Print cost, errors and time."""
+def report(fitted: FittedModel, output: Path) -> None:
+    """Print what was dropped, cost, errors and time."""
+    result = fitted.result
+    for rule, count in fitted.model.fit.get("dropped", {}).items():
+        if count:
+            print(f"dropped     {count} of {fitted.model.fit['wrenches']} wrenches {rule}")
     state = "converged" if result.converged else "not converged"
     print(f"objective   {result.objective}")
     print(f"cost        {result.cost:.6g}, {state} after {result.iterations} steps")
@@ -81,7 +88,7 @@ def run(options: argparse.Namespace) -> None:
         fitted = fit_model(options.input, name, options, executor, progress)
     command = shlex.join(["fit_surface", *options.command])
     write_surface_model(fitted.model, options.output, header=f"Made by: {command}")
-    report(fitted.result, options.output)
+    report(fitted, options.output)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

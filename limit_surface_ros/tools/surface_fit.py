@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import datetime
 import os
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from limit_surface_ros import __version__
 from limit_surface_ros.errors import DataError, RangeError
+from limit_surface_ros.files.bag_pushes import Selection
 from limit_surface_ros.files.surface_file import SurfaceModel
 from limit_surface_ros.fitting.automatic import fit_automatically
 from limit_surface_ros.fitting.dissipation import FITTED_ON, fit_dissipation
@@ -24,7 +25,9 @@ from limit_surface_ros.tools.training_data import (
     ACCEPTED,
     Simulation,
     check_input,
+    is_bag,
     row_numbers,
+    training_data_of_bag,
     training_data_of_contact,
     training_data_of_pushes,
 )
@@ -62,6 +65,7 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
     """Declare every option on which the fitted model depends, but for its name."""
     parser.add_argument("--frame-id", default="object", help="the model's frame (%(default)s)")
     _add_data_options(parser.add_argument_group("data"))
+    _add_bag_options(parser.add_argument_group("bags: what counts as a quasi-static push"))
 
     fit = parser.add_argument_group("fit")
     fit.add_argument(
@@ -149,6 +153,32 @@ def _add_data_options(data: argparse._ArgumentGroup) -> None:
         )
 
 
+def _add_bag_options(bags: argparse._ArgumentGroup) -> None:
+    bags.add_argument("--wrench-topic", help="of WrenchStamped, in the body's frame")
+    bags.add_argument(
+        "--motion-topic",
+        help="of TwistStamped in the same frame, or of PoseStamped in a fixed frame",
+    )
+    helps = {
+        "max_gap": "s|a wrench counts between two motions no further apart",
+        "min_speed": "m/s|slower, the body may stick",
+        "max_speed": "m/s|faster, inertia may count",
+        "max_acceleration": "m/s^2|a larger change of speed is not quasi-static",
+        "min_force": "N|a smaller force does not push",
+        "window": "s|pushes are averaged over windows of this length",
+        "lever": "m|turns angular speed into speed",
+    }
+    for rule, default in asdict(Selection()).items():
+        unit, _, told = helps[rule].partition("|")
+        bags.add_argument(
+            f"--{rule.replace('_', '-')}",
+            type=float,
+            default=default,
+            metavar="X",
+            help=f"{told} [{unit}] (%(default)s)",
+        )
+
+
 def available_cores() -> int:
     """Return the number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
@@ -204,6 +234,11 @@ def read_input(path: Path, options: argparse.Namespace) -> TrainingData:
             options.seed,
         )
         return training_data_of_contact(path, simulation, options.characteristic_length)
+    if is_bag(path):
+        rules = {rule: getattr(options, rule) for rule in asdict(Selection())}
+        return training_data_of_bag(
+            path, options.wrench_topic, options.motion_topic, Selection(**rules)
+        )
     raise RangeError(f"{path}: {suffix or 'no suffix'} is not known; accepted is {ACCEPTED}")
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from limit_surface_ros.errors import DataError, FileError
+from limit_surface_ros.files.bag_pushes import Selection, read_bag_pushes
 from limit_surface_ros.files.contact_file import read_contact
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.fitting.simulation import simulated_pairs
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from limit_surface_ros.surface.pairs import Pairs
 
 SUFFIXES = (".yaml", ".yml", ".csv")
-ACCEPTED = "a contact file (.yaml, .yml) or recorded pushes (.csv)"
+ACCEPTED = "a contact file (.yaml, .yml), recorded pushes (.csv), or a ROS 2 bag"
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,33 @@ def training_data_of_pushes(path: Path, rows: list[int] | None) -> TrainingData:
         recorded=True,
         about={"data": path.name, "rows": "all" if rows is None else rows},
     )
+
+
+def training_data_of_bag(
+    path: Path, wrench_topic: str | None, motion_topic: str | None, selection: Selection
+) -> TrainingData:
+    """Read the quasi-static pushes of a bag.
+
+    Raises:
+        DataError: A topic is not named.
+    """
+    if wrench_topic is None or motion_topic is None:
+        raise DataError(f"{path}: is a bag: name --wrench-topic and --motion-topic")
+    pushes = read_bag_pushes(path, wrench_topic, motion_topic, selection)
+    about = {
+        "data": path.name,
+        "wrench_topic": wrench_topic,
+        "motion_topic": motion_topic,
+        "selection": asdict(selection),
+        "wrenches": pushes.samples,
+        "dropped": pushes.dropped,
+    }
+    return TrainingData(training=pushes.pairs, recorded=True, about=about)
+
+
+def is_bag(path: Path) -> bool:
+    """Tell whether a path is a ROS 2 bag: a folder, or a file of one of the storages."""
+    return path.is_dir() or path.suffix.lower() in (".mcap", ".db3")
 
 
 @dataclass(frozen=True)

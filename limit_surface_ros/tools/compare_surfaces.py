@@ -1,0 +1,201 @@
+"""Compare surfaces on data: model files, and kinds that are fitted on the spot.
+
+Prints one row for each: its size, the quantiles of the error of motion |v - v^| of unit twists,
+the mean angle, the time of its fit and of its two maps. Data are a contact file, recorded pushes,
+or a bag; with rows held out, models are judged on those alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from limit_surface_ros.errors import LimitSurfaceError, RangeError
+from limit_surface_ros.files.surface_file import read_surface_model
+from limit_surface_ros.fitting.multi_start import Search, process_pool
+from limit_surface_ros.fitting.result import errors_on
+from limit_surface_ros.surface.measures import velocity_error
+from limit_surface_ros.tools.program import run_program
+from limit_surface_ros.tools.progress import progress_bar
+from limit_surface_ros.tools.surface_fit import add_fit_options, available_cores, fit, read_input
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.pairs import Pairs
+    from limit_surface_ros.surface.protocol import LimitSurface
+
+EXAMPLES = """examples:
+  compare_surfaces contact.yaml --models a.yaml b.yaml
+  compare_surfaces contact.yaml --fit thesis:1 thesis:3 norms:3 dissipation:3 polynomial
+  compare_surfaces pushes.csv --rows 0-24 --fit thesis:1 convex auto --picture errors.png
+"""
+HEADINGS = (
+    "model",
+    "kind",
+    "numbers",
+    "v 50 %",
+    "v 95 %",
+    "v 100 %",
+    "angle [deg]",
+    "fit [s]",
+    "wrench->twist [us]",
+    "twist->wrench [us]",
+)
+# What --fit takes: the options of fit_surface that each stands for.
+FITS: dict[str, dict[str, object]] = {
+    "thesis": {"kind": "power_sum", "family": "thesis"},
+    "norms": {"kind": "power_sum", "family": "norms"},
+    "dissipation": {"kind": "dissipation"},
+    "polynomial": {"kind": "polynomial"},
+    "convex": {"kind": "polynomial", "objective": "convex"},
+    "auto": {"auto": True},
+}
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
+    top = argparse.ArgumentParser(
+        prog="compare_surfaces",
+        description=__doc__,
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    top.add_argument("data", type=Path, help="a contact file, recorded pushes, or a ROS 2 bag")
+    top.add_argument("--models", nargs="+", type=Path, default=[], help="model files")
+    top.add_argument(
+        "--fit",
+        nargs="+",
+        default=[],
+        metavar="KIND[:TERMS]",
+        help=f"kinds to fit: {', '.join(FITS)}, with a number of terms such as norms:4",
+    )
+    top.add_argument("--picture", type=Path, help="write the errors' distributions to this file")
+    top.add_argument("--workers", type=int, default=available_cores(), help="(%(default)s)")
+    add_fit_options(top)
+    return top
+
+
+def options_of(options: argparse.Namespace, wanted: str) -> argparse.Namespace:
+    """Return the options that a word such as norms:4 stands for.
+
+    Raises:
+        RangeError: There is no such kind, or the terms are no number.
+    """
+    kind, colon, terms = wanted.partition(":")
+    if kind not in FITS or (colon and not terms.isdigit()):
+        raise RangeError(
+            f"--fit takes {', '.join(FITS)}, with a number of terms such as norms:4; "
+            f"got {wanted!r}"
+        )
+    chosen = copy.copy(options)
+    for key, value in FITS[kind].items():
+        setattr(chosen, key, value)
+    if colon:
+        chosen.terms = int(terms)
+    return chosen
+
+
+def size_of(surface: LimitSurface) -> int:
+    """Return how many numbers define a surface: six for each symmetric matrix."""
+    if hasattr(surface, "matrices"):
+        return 6 * len(surface.matrices)
+    if hasattr(surface, "coefficients"):
+        return int(np.size(surface.coefficients))
+    return int(np.size(getattr(surface, "points", 0)) * 3 // 2)
+
+
+def microseconds_each(function: Callable[[Floats], Floats], vectors: Floats) -> float:
+    """Return the time of a map for one vector of many [us], the best of three runs."""
+    times = []
+    for _ in range(3):
+        begin = time.perf_counter()
+        function(vectors)
+        times.append(time.perf_counter() - begin)
+    return 1e6 * min(times) / len(vectors)
+
+
+def row_of(name: str, surface: LimitSurface, test: Pairs, fit_time: float | None) -> list[str]:
+    """Return one row of the table."""
+    errors = errors_on(surface, test)
+    return [
+        name,
+        surface.kind,
+        str(size_of(surface)),
+        *(f"{value:.3f}" for value in errors.velocity),
+        f"{np.degrees(errors.mean_angle):.2f}",
+        "" if fit_time is None else f"{fit_time:.2f}",
+        f"{microseconds_each(surface.twist_of_wrench, test.wrenches):.2f}",
+        f"{microseconds_each(surface.wrench_of_twist, test.twists):.2f}",
+    ]
+
+
+def run(options: argparse.Namespace) -> None:
+    """Read, fit, measure, print, draw."""
+    if not options.models and not options.fit:
+        raise RangeError("nothing to compare: give --models or --fit")
+    wanted = {word: options_of(options, word) for word in options.fit}
+    stored = {path: read_surface_model(path) for path in options.models}
+    data = read_input(options.data, options)
+    test = data.held_out or data.training
+    surfaces: list[tuple[str, LimitSurface, float | None]] = [
+        (path.stem, model.surface, model.fit.get("wall_time_s")) for path, model in stored.items()
+    ]
+    refusals: list[str] = []
+    with process_pool(options.workers) as executor, progress_bar("fits") as progress:
+        for done, (word, chosen) in enumerate(wanted.items(), start=1):
+            try:
+                result = fit(chosen, data, Search(options.starts, options.seed, executor))
+                surfaces.append((word, result.surface, result.wall_time))
+            except LimitSurfaceError as error:
+                refusals.append(f"{word}: {error}")
+            progress(done, len(wanted))
+    kept = "held out" if data.held_out is not None else "fitted"
+    print(f"{options.data}: {len(test)} pairs, {kept}")
+    print_table([row_of(*each[:2], test, each[2]) for each in surfaces])
+    for refusal in refusals:
+        print(f"left out: {refusal}")
+    if options.picture is not None:
+        draw(surfaces, test, options.picture)
+        print(f"written     {options.picture}")
+
+
+def print_table(rows: list[list[str]]) -> None:
+    """Print rows under the headings, aligned."""
+    table = [list(HEADINGS), *rows]
+    widths = [max(len(row[column]) for row in table) for column in range(len(HEADINGS))]
+    for row in table:
+        cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=True)]
+        print("  ".join(cells).rstrip())
+
+
+def draw(surfaces: list[tuple[str, LimitSurface, float | None]], test: Pairs, path: Path) -> None:
+    """Draw the distributions of the errors of motion.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+        FileError: The picture cannot be written.
+    """
+    from limit_surface_ros.plots.canvas import new_figure, save_figure
+    from limit_surface_ros.plots.distributions import draw_distributions
+
+    errors = {name: velocity_error(surface, test) for name, surface, _ in surfaces}
+    with new_figure(7.0, 4.5) as figure:
+        draw_distributions(figure.subplots(), errors, "error of motion |v - v^| of unit twists")
+        save_figure(figure, path)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the program and return its exit code."""
+    return run_program(parser(), run, argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,126 @@
+"""Pushes are found in real bags of both storages, and what is dropped is counted."""
+
+import numpy as np
+import pytest
+
+from limit_surface_ros.errors import DataError, FileError, RangeError
+from limit_surface_ros.files.bag_pushes import Selection, read_bag_pushes
+
+pytest.importorskip("rosbags", reason="the extra 'bags' is not installed")
+
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+TYPES = STORE.types
+WRENCH, TWIST, POSE = (f"geometry_msgs/msg/{name}Stamped" for name in ("Wrench", "Twist", "Pose"))
+
+
+def header(time, frame):
+    stamp = TYPES["builtin_interfaces/msg/Time"](sec=int(time), nanosec=round(time % 1 * 1e9))
+    return TYPES["std_msgs/msg/Header"](stamp=stamp, frame_id=frame)
+
+
+def vector(x, y, z):
+    return TYPES["geometry_msgs/msg/Vector3"](x=x, y=y, z=z)
+
+
+def wrench(time, fx, fy, tau):
+    load = TYPES["geometry_msgs/msg/Wrench"](force=vector(fx, fy, 9.0), torque=vector(9, 9, tau))
+    return TYPES[WRENCH](header=header(time, "object"), wrench=load)
+
+
+def twist(time, vx, vy, omega, frame="object"):
+    motion = TYPES["geometry_msgs/msg/Twist"](
+        linear=vector(vx, vy, 0.0), angular=vector(0.0, 0.0, omega)
+    )
+    return TYPES[TWIST](header=header(time, frame), twist=motion)
+
+
+def pose(time, x, y, yaw, frame="world"):
+    turn = TYPES["geometry_msgs/msg/Quaternion"](
+        x=0.0, y=0.0, z=float(np.sin(yaw / 2)), w=float(np.cos(yaw / 2))
+    )
+    place = TYPES["geometry_msgs/msg/Point"](x=x, y=y, z=0.0)
+    at = TYPES["geometry_msgs/msg/Pose"](position=place, orientation=turn)
+    return TYPES[POSE](header=header(time, frame), pose=at)
+
+
+def write_bag(path, topics, storage=StoragePlugin.SQLITE3):
+    with Writer(path, version=9, storage_plugin=storage) as writer:
+        for topic, (kind, messages) in topics.items():
+            connection = writer.add_connection(topic, kind, typestore=STORE)
+            for message in messages:
+                stamp = message.header.stamp
+                time = stamp.sec * 10**9 + stamp.nanosec
+                writer.write(connection, time, STORE.serialize_cdr(message, kind))
+    return path
+
+
+TIMES = np.arange(100.0, 102.0, 0.01)
+
+
+def steady_push(times=TIMES):
+    wrenches = [wrench(t, 1.0, 0.5, 0.02) for t in times]
+    twists = [twist(t, 0.02, 0.01, 0.1) for t in times + 0.003]
+    return {"/load": (WRENCH, wrenches), "/motion": (TWIST, twists)}
+
+
+@pytest.mark.parametrize("storage", [StoragePlugin.SQLITE3, StoragePlugin.MCAP])
+def test_a_steady_push_is_read_from_both_storages(tmp_path, storage):
+    bag = write_bag(tmp_path / "bag", steady_push(), storage)
+    pushes = read_bag_pushes(bag, "load", "/motion")
+    assert len(pushes.pairs) == 4
+    np.testing.assert_allclose(pushes.pairs.wrenches, np.tile([1.0, 0.5, 0.02], (4, 1)))
+    np.testing.assert_allclose(pushes.pairs.twists, np.tile([0.02, 0.01, 0.1], (4, 1)))
+    assert pushes.samples == len(TIMES)
+    assert pushes.dropped["without motions near them"] == 1
+
+
+def test_poses_in_a_fixed_frame_become_twists_of_the_body(tmp_path):
+    topics = steady_push()
+    # Along the body's own x at 0.02 m/s while turning at 0.5 rad/s: a circle.
+    angle = 2.0 + 0.5 * (TIMES - TIMES[0])
+    radius = 0.02 / 0.5
+    poses = [
+        pose(t, float(radius * np.sin(a)), float(-radius * np.cos(a)), a)
+        for t, a in zip(TIMES, angle, strict=True)
+    ]
+    topics["/motion"] = (POSE, poses)
+    pushes = read_bag_pushes(write_bag(tmp_path / "bag", topics), "/load", "/motion")
+    expected = np.tile([0.02, 0.0, 0.5], (len(pushes.pairs), 1))
+    np.testing.assert_allclose(pushes.pairs.twists, expected, atol=1e-5)
+
+
+def test_every_rule_drops_what_it_says(tmp_path):
+    topics = steady_push()
+    loads, motions = topics["/load"][1], topics["/motion"][1]
+    for index in range(40):
+        loads[index] = wrench(TIMES[index], 0.01, 0.0, 0.0)
+        motions[60 + index] = twist(TIMES[60 + index], 0.0, 0.0, 0.0)
+        motions[150 + index] = twist(TIMES[150 + index], 0.3, 0.0, 0.0)
+    topics["/motion"] = (TWIST, motions)
+    loads[120] = wrench(TIMES[120], float("nan"), 0.0, 0.0)
+    pushes = read_bag_pushes(write_bag(tmp_path / "bag", topics), "/load", "/motion")
+    assert pushes.dropped["with too small a force"] == 39  # one lies before the motions
+    assert 35 <= pushes.dropped["too slow"] <= 40
+    assert 35 <= pushes.dropped["too fast"] <= 42
+    assert pushes.dropped["accelerating"] > 0
+    assert pushes.dropped["with a number that is not finite"] == 1
+    np.testing.assert_allclose(pushes.pairs.wrenches[:, 0], 1.0)
+
+
+def test_faults_of_a_bag_are_named(tmp_path):
+    bag = write_bag(tmp_path / "bag", steady_push())
+    with pytest.raises(FileError, match="has no topic /speed; there are /load, /motion"):
+        read_bag_pushes(bag, "load", "speed")
+    with pytest.raises(FileError, match=r"no number 'pose\.position"):
+        read_bag_pushes(bag, "load", "load")
+    with pytest.raises(DataError, match="no part is a quasi-static push; of 200 wrenches"):
+        read_bag_pushes(bag, "load", "motion", Selection(min_force=50.0))
+    with pytest.raises(RangeError, match="window"):
+        Selection(window=0.0)
+    topics = steady_push()
+    topics["/motion"] = (TWIST, [twist(t, 0.02, 0.0, 0.0, "world") for t in TIMES])
+    with pytest.raises(FileError, match="motions are given in frame 'world'"):
+        read_bag_pushes(write_bag(tmp_path / "other", topics), "load", "motion")

@@ -1,0 +1,71 @@
+"""compare_surfaces: one table of models and kinds, pictures, and clear refusals."""
+
+import numpy as np
+import pytest
+
+from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
+from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.scaling import Scaling
+from limit_surface_ros.tools.compare_surfaces import main
+
+CONTACT = """schema: 1
+name: triangle
+points: [[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]]
+friction_limits: [0.5, 0.5, 0.5]
+"""
+
+
+@pytest.fixture
+def contact(tmp_path):
+    path = tmp_path / "contact.yaml"
+    path.write_text(CONTACT)
+    return path
+
+
+def rows(printed):
+    return {line.split()[0]: line.split() for line in printed.splitlines()[2:] if line}
+
+
+def test_files_and_kinds_stand_in_one_table(contact, tmp_path, capsys):
+    model = tmp_path / "round.yaml"
+    surface = PowerSum(np.eye(3)[None], [1.0], Scaling(0.08, 1.0))
+    write_surface_model(SurfaceModel("round", surface), model)
+    few = ["--motions", "300", "--facet-loads", "10", "--workers", "1"]
+    fits = ["--fit", "thesis:2", "dissipation:3"]
+    assert main([str(contact), "--models", str(model), *fits, *few]) == 0
+    table = rows(capsys.readouterr().out)
+    assert list(table) == ["round", "thesis:2", "dissipation:3"]
+    angles = [float(cells[6]) for cells in table.values()]
+    assert angles[0] > angles[1] > angles[2]
+    assert [cells[2] for cells in table.values()] == ["6", "12", "18"]
+
+
+def test_the_distributions_are_drawn(contact, tmp_path, capsys):
+    pytest.importorskip("matplotlib", reason="the extra 'plots' is not installed")
+    picture = tmp_path / "errors.png"
+    few = ["--motions", "100", "--facet-loads", "5", "--workers", "1"]
+    assert main([str(contact), "--fit", "thesis:1", "--picture", str(picture), *few]) == 0
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert str(picture) in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "nothing to compare"),
+        (["--fit", "spline:3"], "got 'spline:3'"),
+        (["--fit", "norms:x"], "got 'norms:x'"),
+        (["--models", "none.yaml"], "none.yaml: cannot be read"),
+    ],
+)
+def test_what_cannot_be_compared_is_refused(contact, capsys, arguments, message):
+    assert main([str(contact), *arguments]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_kind_that_the_data_cannot_support_is_left_out_with_its_reason(contact, capsys):
+    few = ["--motions", "16", "--facet-loads", "0", "--workers", "1"]
+    assert main([str(contact), "--fit", "thesis:1", "thesis:3", *few]) == 0
+    printed = capsys.readouterr().out
+    assert "left out: thesis:3: 16 pairs cannot determine 18 parameters" in printed
+    assert "thesis:1 " in printed
