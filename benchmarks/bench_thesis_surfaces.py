@@ -4,8 +4,9 @@ Each stands beside the best figures known before.
 
 Training: 2000 random motions, and 150 loads on each facet of the support points. Tests: 2000 fresh
 motions for v = |v - v^| of unit twists, 1000 unit loads for f, the model's load against the exact
-one for the model's own motion, in parts of the friction force scale. Quantiles 50 / 95 / 100 %.
-Forces are in units of two friction limits, lengths of 150 mm.
+one for the model's own motion, in parts of the friction force scale; for dissipation models, which
+give loads of motions, f is that of the fresh motions. Quantiles 50 / 95 / 100 %. Forces are in
+units of two friction limits, lengths of 150 mm.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from limit_surface_ros.fitting.second_approximation import fit_second_approximat
 from limit_surface_ros.fitting.simulation import simulated_pairs
 from limit_surface_ros.surface import shapes
 from limit_surface_ros.surface.contact_patch import ContactPatch
-from limit_surface_ros.surface.measures import load_error, quantiles
+from limit_surface_ros.surface.measures import force_error, load_error, quantiles
 from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.point_contacts import PointContacts
 from limit_surface_ros.surface.power_sum import thesis_exponents
@@ -134,15 +135,11 @@ def models(search: Search, body: str) -> dict[str, Callable[[Pairs], FitResult]]
     return fits
 
 
-def force_quantiles(surface: LimitSurface, exact: PointContacts) -> np.ndarray:
-    """Return the quantiles of the force error at the model's own motions.
-
-    Both loads are those of the same motion, so that facets, where many loads share one, do not
-    count a choice among them as an error.
-    """
-    loads = random_directions(1000, 3) * SCALING.wrench_unit
-    twists = surface.twist_of_wrench(loads)
-    return quantiles(load_error(surface, Pairs(exact.wrench_of_twist(twists), twists)))
+def force_quantiles(surface: LimitSurface, exact: PointContacts, test: Pairs) -> np.ndarray:
+    """Return the quantiles of the force error."""
+    if surface.kind == "dissipation":
+        return quantiles(load_error(surface, test))
+    return quantiles(force_error(surface, exact, random_directions(1000, 3)))
 
 
 def shown(values: np.ndarray) -> str:
@@ -161,7 +158,7 @@ def print_table(title: str, body: str, exact: PointContacts, noise: float, searc
     for name, fit in models(search, body).items():
         try:
             result = fit(pairs).tested_on(test)
-            force = shown(force_quantiles(result.surface, exact))
+            force = shown(force_quantiles(result.surface, exact, test))
         except MissingExtraError as error:
             print(f"| {name} | skipped: {error} | | | | | | |")
             continue

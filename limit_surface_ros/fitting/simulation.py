@@ -33,8 +33,8 @@ def simulated_pairs(
         motions: How many motions, uniform over the directions of scaled motion.
         per_facet: How many loads on each facet, for bodies on a few points; a patch of many gets
             none.
-        load_noise: Standard deviation of the noise on each component of the scaled load, in parts
-            of the root mean square load.
+        load_noise: Standard deviation of the noise on each component of the load, in parts of
+            that component's root mean square.
         motion_noise: Standard deviation of the noise on each component of the unit motion.
         seed: Of all that is random.
 
@@ -49,7 +49,7 @@ def simulated_pairs(
         parts.append(facet_loads(contacts, per_facet, draw))
     loads = np.concatenate([part.wrenches for part in parts]) / contacts.scaling.wrench_unit
     twists = np.concatenate([part.twists for part in parts]) / contacts.scaling.twist_unit
-    size = np.sqrt(np.mean(np.sum(loads**2, axis=1)))
+    size = np.sqrt(np.mean(loads**2, axis=0))
     loads = loads + load_noise * size * noise.standard_normal(loads.shape)
     twists = twists + motion_noise * noise.standard_normal(twists.shape)
     return Pairs(loads * contacts.scaling.wrench_unit, twists * contacts.scaling.twist_unit)

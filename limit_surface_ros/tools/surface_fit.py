@@ -143,7 +143,7 @@ def _add_data_options(data: argparse._ArgumentGroup) -> None:
         default=150,
         help="loads on each facet of a contact of a few points (%(default)s)",
     )
-    for what, of in (("load", "the root mean square load"), ("motion", "a unit motion")):
+    for what, of in (("load", "each component's root mean square"), ("motion", "a unit motion")):
         data.add_argument(
             f"--{what}-noise",
             type=float,
