@@ -1,8 +1,5 @@
 """Command line programs."""
 
-import os
+from limit_surface_ros.blas_threads import use_one_by_default
 
-# Fits are many products of small matrices: BLAS threads only wait for each other in them, and
-# starve the other processes of a fit. They are set before numpy is first imported.
-for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(_variable, "1")
+use_one_by_default()
