@@ -45,6 +45,10 @@ class Inverse(Protocol):
         """Return the points (3, m) for vectors (3, m), none zero, and the largest n.x (m,)."""
         ...
 
+    def starts_of_one(self, normal: Floats) -> Floats:
+        """Return points (s, 3) that lead smoothly to the answer for one vector (3,), if any do."""
+        ...
+
 
 @runtime_checkable
 class BoundedGauge(Gauge, Protocol):
@@ -103,6 +107,12 @@ class ConvexInverse:
         points /= self._gauge.values(points)
         return points, (normals * points).sum(axis=0)
 
+    def starts_of_one(self, normal: Floats) -> Floats:
+        """Return the start for one vector (3,), none where a corner might be the answer."""
+        if self._corners is not None:
+            return np.empty((0, 3))
+        return self._starts[:, np.argmax(normal @ self._starts)][np.newaxis]
+
 
 class PeakInverse:
     """Points x of g(x) = 1 with the largest n.x, for a gauge that need not be convex.
@@ -143,6 +153,12 @@ class PeakInverse:
         best[columns[rising]] = rising
         summits: Floats = points[:, best]
         return summits, (normals * summits).sum(axis=0)
+
+    def starts_of_one(self, normal: Floats) -> Floats:
+        """Return the starts (s, 3) that are worth climbing for one vector (3,)."""
+        unit = normal / np.sqrt(normal @ normal)
+        rows, _ = self._peaks(unit[:, np.newaxis])
+        return np.asarray(self._ellipsoids[rows] @ unit)
 
     def _peaks(self, units: Floats) -> tuple[Places, Places]:
         """Return the rows of the table that are worth climbing, and for which vectors (3, m)."""
@@ -186,6 +202,10 @@ class FramedInverse:
         """Return the points (3, m) of most power for vectors (3, m), and that power (m,)."""
         points, power = self._inverse.solve(self._frame.T @ normals)
         return self._frame @ points, power
+
+    def starts_of_one(self, normal: Floats) -> Floats:
+        """Return points (s, 3) that lead smoothly to the answer for one vector (3,), if any do."""
+        return np.asarray(self._inverse.starts_of_one(self._frame.T @ normal) @ self._frame.T)
 
 
 def round_frame(gauge: Gauge) -> Floats:

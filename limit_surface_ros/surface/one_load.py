@@ -60,7 +60,7 @@ def gauge_of_one(terms: Sequence[Term], load: Vector) -> float | None:
         if not least * size < q:
             return None
         forms.append(q)
-    t = _log_scale(terms, forms)
+    t = log_scale_of_one(terms, forms)
     return None if t is None else exp(-t)
 
 
@@ -102,7 +102,7 @@ def normal_of_one(terms: Sequence[Term], load: Vector) -> Vector | None:
             return None
         forms.append(q)
         pulls.append((a * u + d * v + g * w, b * u + e * v + h * w, c * u + f * v + i * w))
-    t = _log_scale(terms, forms)
+    t = log_scale_of_one(terms, forms)
     if t is None:
         return None
     gx = gy = gz = 0.0
@@ -115,7 +115,7 @@ def normal_of_one(terms: Sequence[Term], load: Vector) -> Vector | None:
     return gx, gy, gz
 
 
-def _log_scale(terms: Sequence[Term], forms: list[float]) -> float | None:
+def log_scale_of_one(terms: Sequence[Term], forms: list[float]) -> float | None:
     """Return t with sum_i exp(p_i (log q_i + 2 t)) = 1; see `power_sum_scale.log_scales`."""
     t = -0.5 * log(max(forms))
     slopes = [(2.0 * term[0], term[0] * log(q)) for term, q in zip(terms, forms, strict=True)]

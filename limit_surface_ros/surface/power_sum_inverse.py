@@ -43,6 +43,10 @@ class EllipsoidInverse:
         power = np.sqrt((sphere * sphere).sum(axis=0))
         return self._inverse_root @ (sphere / power), power
 
+    def starts_of_one(self, normal: Floats) -> Floats:
+        """Return the answer itself for one vector (3,), shape (1, 3)."""
+        return np.asarray(self.solve(normal[:, np.newaxis])[0].T)
+
 
 def power_sum_inverse(roots: Floats, exponents: Floats) -> Inverse:
     """Return the map from twists to loads of most power on sum_i |R_i f|^(2 p_i) = 1.
@@ -121,6 +125,10 @@ class SpikedInverse:
             points[:, better] = (self._spikes[:, best] * np.sign(signed))[:, better]
             power = np.where(better, np.abs(signed), power)
         return points, power
+
+    def starts_of_one(self, _normal: Floats) -> Floats:
+        """Return no start: a spike may be the answer."""
+        return np.empty((0, 3))
 
 
 def _on_surface(roots: Floats, exponents: Floats, directions: list[Floats]) -> Floats:

@@ -74,3 +74,18 @@ def test_a_twist_at_a_kink_gives_the_middle_of_its_facet(surface):
     np.testing.assert_allclose(
         contacts.wrench_of_twist(twist), contacts.wrench_of_twist([twist])[0], rtol=1e-12
     )
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_lean_path_finds_the_same_most_power_on_any_power_sum(seed):
+    rng = np.random.default_rng(seed)
+    terms = rng.integers(1, 5)
+    roots = rng.standard_normal((terms, 3, 3)) * 10.0 ** rng.uniform(-1, 0, (terms, 3, 1))
+    surface = PowerSum(np.swapaxes(roots, 1, 2) @ roots, rng.uniform(0.15, 1, terms), SCALING)
+    twists = rng.standard_normal((30, 3)) * SCALING.twist_unit
+    loads = np.array([surface.wrench_of_twist(twist) for twist in twists])
+    np.testing.assert_allclose(surface.load_factor(loads), 1.0, rtol=1e-12)
+    many = surface.wrench_of_twist(twists)
+    np.testing.assert_allclose(
+        (loads * twists).sum(axis=1), (many * twists).sum(axis=1), rtol=1e-12
+    )

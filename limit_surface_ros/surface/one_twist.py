@@ -1,0 +1,158 @@
+"""The load of most power of a power sum for a single twist, in plain floats.
+
+Newton's method as in `plane_minimum`, with what is constant in the plane worked out beforehand.
+Whatever does not go smoothly is left to that module: the functions then return None.
+"""
+
+from __future__ import annotations
+
+from math import exp, hypot, log, sqrt
+from typing import TYPE_CHECKING
+
+from limit_surface_ros.surface.one_load import gauge_of_one, log_scale_of_one
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from limit_surface_ros.surface.one_load import Term, Vector
+
+_STEPS = 30
+# A form below this would make its term's curvature lose its digits: a corner is near.
+_SMALL = 1e-9
+_LAST_STEP = 1e-8
+_TARGET = 1e-14
+
+
+def most_power_of_one(
+    terms: Sequence[Term], twist: Vector, starts: Iterable[Vector]
+) -> Vector | None:
+    """Return the load on the surface with the most power of those that the starts lead to.
+
+    Args:
+        terms: Of scaled loads; see `one_load.one_load_terms`.
+        twist: Scaled, not zero.
+        starts: Scaled loads with power above zero.
+
+    Returns:
+        The load; None if there is no start or one does not lead anywhere.
+    """
+    best = None
+    most = 0.0
+    for start in starts:
+        load = _climb(terms, twist, start)
+        if load is None:
+            return None
+        power = load[0] * twist[0] + load[1] * twist[1] + load[2] * twist[2]
+        if power > most:
+            best, most = load, power
+    return best
+
+
+def _climb(terms: Sequence[Term], twist: Vector, start: Vector) -> Vector | None:
+    """Minimise log g over the plane through n with normal n = twist / |twist|."""
+    length = sqrt(twist[0] ** 2 + twist[1] ** 2 + twist[2] ** 2)
+    nx, ny, nz = twist[0] / length, twist[1] / length, twist[2] / length
+    sign = 1.0 if nz >= 0.0 else -1.0
+    a = -1.0 / (sign + nz)
+    b = nx * ny * a
+    first = (1.0 + sign * nx * nx * a, sign * b, -sign * nx)
+    second = (b, sign + ny * ny * a, -ny)
+    along = start[0] * nx + start[1] * ny + start[2] * nz
+    p = (start[0] * first[0] + start[1] * first[1] + start[2] * first[2]) / along
+    q = (start[0] * second[0] + start[1] * second[1] + start[2] * second[2]) / along
+    # In the plane a form is q0 + 2 (b1 p + b2 q) + a11 p^2 + 2 a12 p q + a22 q^2.
+    forms = [_in_plane(term, (nx, ny, nz), first, second) for term in terms]
+    previous = float("inf")
+    for _ in range(_STEPS):
+        found = _newton(terms, forms, p, q)
+        if found is None:
+            return None
+        t, gradient, move = found
+        if -t > previous + 1e-15:
+            return None
+        previous = -t
+        sine = hypot(*gradient) / abs(1.0 - p * gradient[0] - q * gradient[1])
+        step = hypot(*move) / sqrt(1.0 + p * p + q * q)
+        if sine > _TARGET:
+            p += move[0]
+            q += move[1]
+        if sine <= _TARGET or step <= _LAST_STEP:
+            load = (
+                nx + p * first[0] + q * second[0],
+                ny + p * first[1] + q * second[1],
+                nz + p * first[2] + q * second[2],
+            )
+            gauge = gauge_of_one(terms, load)
+            return None if gauge is None else (load[0] / gauge, load[1] / gauge, load[2] / gauge)
+    return None
+
+
+def _in_plane(term: Term, normal: Vector, first: Vector, second: Vector) -> tuple[float, ...]:
+    """Return q0, b1, b2, a11, a12, a22 of a term's form in the plane."""
+    _, _, a, b, c, d, e, f, g, h, i = term
+    images = [
+        (a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z)
+        for x, y, z in (normal, first, second)
+    ]
+    return tuple(
+        u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+        for u, v in (
+            (images[0], images[0]),
+            (images[0], images[1]),
+            (images[0], images[2]),
+            (images[1], images[1]),
+            (images[1], images[2]),
+            (images[2], images[2]),
+        )
+    )
+
+
+def _value(form: tuple[float, ...], p: float, q: float) -> float:
+    q0, b1, b2, a11, a12, a22 = form
+    return q0 + p * (2.0 * b1 + a11 * p + 2.0 * a12 * q) + q * (2.0 * b2 + a22 * q)
+
+
+def _newton(
+    terms: Sequence[Term], forms: list[tuple[float, ...]], p: float, q: float
+) -> tuple[float, tuple[float, float], tuple[float, float]] | None:
+    """Return t = -log g, the gradient of log g and Newton's move for g; see `PowerGauge`."""
+    values = [_value(form, p, q) for form in forms]
+    for value, form in zip(values, forms, strict=True):
+        if not value > _SMALL * (form[0] + form[3] * p * p + form[5] * q * q):
+            return None
+    t = log_scale_of_one(terms, values)
+    if t is None:
+        return None
+    total = second_total = g1 = g2 = m1 = m2 = k11 = k12 = k22 = 0.0
+    for term, value, (_, b1, b2, a11, a12, a22) in zip(terms, values, forms, strict=True):
+        exponent = term[0]
+        share = 2.0 * exponent * exp(exponent * (log(value) + 2.0 * t))
+        weight = share / value
+        c1, c2 = b1 + a11 * p + a12 * q, b2 + a12 * p + a22 * q
+        bend = (2.0 * exponent - 2.0) / value
+        total += share
+        second_total += 2.0 * exponent * share
+        g1 += weight * c1
+        g2 += weight * c2
+        m1 += 2.0 * exponent * weight * c1
+        m2 += 2.0 * exponent * weight * c2
+        k11 += weight * (a11 + bend * c1 * c1)
+        k12 += weight * (a12 + bend * c1 * c2)
+        k22 += weight * (a22 + bend * c2 * c2)
+    g1 /= total
+    g2 /= total
+    both = second_total / total + 1.0
+    h11 = (k11 - 2.0 * m1 * g1) / total + both * g1 * g1
+    h12 = (k12 - m1 * g2 - m2 * g1) / total + both * g1 * g2
+    h22 = (k22 - 2.0 * m2 * g2) / total + both * g2 * g2
+    determinant = h11 * h22 - h12 * h12
+    if not (determinant > 1e-10 * (h11 + h22) ** 2 and h11 > 0.0):
+        return None
+    return (
+        t,
+        (g1, g2),
+        (
+            (h12 * g2 - h22 * g1) / determinant,
+            (h12 * g1 - h11 * g2) / determinant,
+        ),
+    )
