@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from limit_surface_ros.checks import as_positive
 from limit_surface_ros.decay.rate_choice import RateChoice
 from limit_surface_ros.decay.rates_dde import dde_rates
-from limit_surface_ros.decay.rates_esprit import esprit_rates
+from limit_surface_ros.decay.rates_esprit import esprit_choices, esprit_rates
 from limit_surface_ros.decay.rates_neutral import neutral_rates
 from limit_surface_ros.decay.rates_polished import polished_rates
 from limit_surface_ros.decay.response_fits import ResponseFit, fit_response
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 METHODS = ("dde", "neutral", "esprit", "polished", "best")
 Progress = Callable[[str], None]
+# Starts with more than this times the error of the best are not worth polishing.
+MOST_BEHIND = 2.0
 
 
 @dataclass(frozen=True)
@@ -76,8 +78,8 @@ def fit_decay(
         end: End of the interval [s].
         method: How rates are chosen: "dde" (characteristic roots of the response's own delay
             system, the thesis), "neutral" (closed-form roots), "esprit" (from samples),
-            "polished" (ESPRIT's rates, then moved to reduce the error), or "best" (the best of
-            neutral and esprit, polished unless the record is noisy).
+            "polished" (ESPRIT's rates, then moved to reduce the error unless the record is noisy),
+            or "best" (the better of neutral and polished).
         norm: In which norm the coefficients are fitted, see `coefficient_fits`. Rates are always
             chosen by the infinity norm.
         options: Choices for single methods.
@@ -114,44 +116,48 @@ def _choose(
     elif method == "esprit":
         choice = esprit_rates(response, terms, end)
     elif method == "polished":
-        choice = _polish(
-            response, end, _choose(response, terms, end, "esprit", options, tell), tell
-        )
+        choice = _polished(response, terms, end, tell)
     else:
         return _best(response, terms, end, options, tell)
     tell(f"{method}: {len(choice.rates)} rates, error {choice.error:.4g}")
     return choice
 
 
-def _best(
-    response: Target, terms: int, end: float, options: Options, tell: Progress
-) -> RateChoice:
-    """Polish each closed or sampled choice and keep the best; none of them can spoil it.
+def _polished(response: Target, terms: int, end: float, tell: Progress) -> RateChoice:
+    """Polish ESPRIT's rates of each window: the best start need not lead to the best end.
 
     The largest error of a noisy record is its worst outlier, which polishing would chase.
     """
-    noisy = is_noisy(response)
+    starts = esprit_choices(response, terms, end)
+    best = starts[0]
+    tell(f"esprit: {len(best.rates)} rates, error {best.error:.4g}")
+    if is_noisy(response):
+        return best
+
+    def each_step(step: int, error: float) -> None:
+        if step % 10 == 0:
+            tell(f"polishing: step {step}, error {error:.4g}")
+
+    promising = [start for start in starts if start.error <= MOST_BEHIND * starts[0].error]
+    for number, start in enumerate(promising, start=1):
+        choice = polished_rates(response, end, start, each_step)
+        tell(f"polished {number} of {len(promising)}: error {choice.error:.4g}")
+        best = min(best, choice, key=lambda choice: choice.error)
+    return best
+
+
+def _best(
+    response: Target, terms: int, end: float, options: Options, tell: Progress
+) -> RateChoice:
+    """Keep the best of the methods that need no kernel; one that fails does not spoil others."""
     choices: list[RateChoice] = []
     failure: LimitSurfaceError | None = None
-    for method in ("esprit", "neutral"):
+    for method in ("polished", "neutral"):
         try:
-            choice = _choose(response, terms, end, method, options, tell)
-            choices.append(choice)
-            if not noisy:
-                choices.append(_polish(response, end, choice, tell))
+            choices.append(_choose(response, terms, end, method, options, tell))
         except LimitSurfaceError as error:
             failure = error
             tell(f"{method}: {error}")
     if not choices:
         raise SolverError(f"no method found rates; the last said: {failure}")
     return min(choices, key=lambda choice: choice.error)
-
-
-def _polish(response: Target, end: float, start: RateChoice, tell: Progress) -> RateChoice:
-    def each_step(step: int, error: float) -> None:
-        if step % 10 == 0:
-            tell(f"polishing {start.method}: step {step}, error {error:.4g}")
-
-    choice = polished_rates(response, end, start, each_step)
-    tell(f"polished {start.method}: error {choice.error:.4g}")
-    return choice

@@ -25,6 +25,8 @@ from limit_surface_ros.decay.targets import uniform_times
 from limit_surface_ros.errors import DataError, RangeError, ShapeError, SolverError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
@@ -92,27 +94,33 @@ def esprit_rates(
         RangeError: A number is out of range.
         SolverError: No window gives usable rates.
     """
+    windows = None if window is None else [as_positive("window", window)]
+    return esprit_choices(response, terms, end, windows)[0]
+
+
+def esprit_choices(
+    response: Target, terms: int, end: float, windows: Sequence[float] | None = None
+) -> list[RateChoice]:
+    """Return ESPRIT's rates of a response from each of several windows, the best first.
+
+    Raises:
+        RangeError: A number is out of range.
+        SolverError: No window gives usable rates.
+    """
     if terms < 1:
         raise RangeError(f"terms must be at least 1, got {terms}")
-    settled = settling_time(response, end)
-    windows = sorted({min(factor * settled, end) for factor in WINDOWS} | {end})
-    if window is not None:
-        windows = [as_positive("window", window)]
+    if windows is None:
+        settled = settling_time(response, end)
+        windows = sorted({min(factor * settled, end) for factor in WINDOWS} | {end})
     choices: list[RateChoice] = []
     for length in windows:
-        for order in (terms, terms - 1):
-            # An even order may come out as pairs only where an odd one has a real rate.
-            if order < 1 or (order < terms and len(choices)):
-                continue
-            times = _times(response, length, max(SAMPLES, 8 * terms))
-            rates = damped(esprit(response(times), float(times[1]), order), end)
-            rates = take(rates, terms)
-            if len(rates) == 0:
-                continue
+        times = _times(response, length, max(SAMPLES, 8 * terms))
+        rates = take(damped(esprit(response(times), float(times[1]), terms), end), terms)
+        if len(rates):
             choices.append(judged(rates, response, end, "esprit", None, {"window": length}))
     if not choices:
-        raise SolverError("ESPRIT found no usable rate in this response")
-    return min(choices, key=lambda choice: choice.error)
+        raise SolverError(f"ESPRIT found no usable rate with {terms} term(s) in this response")
+    return sorted(choices, key=lambda choice: choice.error)
 
 
 def damped(rates: Complexes, end: float) -> Complexes:

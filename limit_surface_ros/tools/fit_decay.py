@@ -37,7 +37,7 @@ EXAMPLES = """methods:
   neutral   roots of x(t) = eps x(t - L), in closed form, beside --tail-rate if given
   esprit    rates of the samples by ESPRIT, coefficients refitted
   polished  those of esprit, moved to make the largest error smaller
-  best      the best of neutral and esprit, polished
+  best      the better of neutral and polished
 
 examples:
   fit_decay f1 --terms 9 --output hockey_stick.yaml
