@@ -35,6 +35,11 @@ class SumOfObjectives:
         """Return a start of the first objective."""
         return self.first.start(rng)
 
+    def coarse(self) -> SumOfObjectives | None:
+        """Return the sum on a part of the pairs, if both have one."""
+        first, second = self.first.coarse(), self.second.coarse()
+        return None if first is None or second is None else SumOfObjectives(first, second)
+
     def surface(self, parameters: Floats) -> LimitSurface:
         """Return the first objective's surface."""
         return self.first.surface(parameters)
@@ -68,6 +73,11 @@ class HeldObjective:
     def start(self, rng: np.random.Generator) -> Floats:
         """Return the centre."""
         return self.centre
+
+    def coarse(self) -> HeldObjective | None:
+        """Return the held objective on a part of the pairs, if there is one."""
+        part = self.objective.coarse()
+        return None if part is None else HeldObjective(part, self.centre, self.strength)
 
     def surface(self, parameters: Floats) -> LimitSurface:
         """Return the surface of `parameters`."""

@@ -95,6 +95,11 @@ class DissipationDirectionObjective:
         """Return random terms that together resist loads of the pairs' size."""
         return random_factors(self._loads, self._terms, rng)
 
+    def coarse(self) -> DissipationDirectionObjective | None:
+        """Return the same fit to a part of the pairs, if they are very many."""
+        part = self._pairs.coarse(self.size)
+        return None if part is None else DissipationDirectionObjective(part, *self._arguments[1:])
+
     def surface(self, parameters: Floats) -> Dissipation:
         """Return the dissipation model of `parameters`."""
         matrices, _ = floored_matrices(parameters, self._floor)

@@ -89,6 +89,11 @@ class DissipationForceObjective:
         """Return random terms that together resist loads of the pairs' size."""
         return random_factors(self._loads, self._terms, rng)
 
+    def coarse(self) -> DissipationForceObjective | None:
+        """Return the same fit to a part of the pairs, if they are very many."""
+        part = self._pairs.coarse(self.size)
+        return None if part is None else DissipationForceObjective(part, self._terms, self._floor)
+
     def surface(self, parameters: Floats) -> Dissipation:
         """Return the dissipation model of `parameters`."""
         matrices, _ = floored_matrices(parameters, self._floor)

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import minimize
 
 from limit_surface_ros.errors import RangeError, SolverError
+from limit_surface_ros.fitting.bfgs import minimise
 from limit_surface_ros.fitting.worker_processes import worker_processes
 
 if TYPE_CHECKING:
@@ -30,10 +30,9 @@ if TYPE_CHECKING:
 # Relative difference of cost within which two starts have found the same minimum.
 AGREEMENT = 1e-3
 PRECISION = 1e-10
-_MAX_ITERATIONS = 2000
-# Pairs of steps that L-BFGS remembers: about the number of parameters, so that it is BFGS in all
-# but name and a step costs next to nothing.
-_MEMORY = 30
+_MOST_ITERATIONS = 2000
+# On a part of the pairs the minimum is only approached.
+_COARSE_PRECISION = 1e-6
 
 
 @dataclass(frozen=True)
@@ -73,8 +72,8 @@ class Descent:
     Attributes:
         cost: The cost there.
         parameters: Shape (size,).
-        iterations: Steps taken.
-        evaluations: Times that cost and gradient were computed.
+        iterations: Steps taken, those on a part of the pairs included.
+        evaluations: Times that cost and gradient were computed, likewise.
         gradient_norm: Largest component of the gradient there.
         converged: Whether the descent ended because nothing more was to be gained.
     """
@@ -88,33 +87,26 @@ class Descent:
 
 
 def descend(objective: Objective, start: Floats, precision: float = PRECISION) -> Descent:
-    """Minimise by BFGS with limited memory from `start`.
+    """Minimise by BFGS from `start`, first on a part of the pairs where there are very many.
 
     Args:
         objective: What to minimise.
         start: Shape (size,).
-        precision: Relative gain of a step below which it is the last.
+        precision: Relative gain of a step below which nothing more is to be gained.
     """
-    found = minimize(
-        objective.cost_and_gradient,
-        start,
-        jac=True,
-        method="L-BFGS-B",
-        options={
-            "maxcor": _MEMORY,
-            "maxiter": _MAX_ITERATIONS,
-            "maxfun": 2 * _MAX_ITERATIONS,
-            "ftol": precision,
-            "gtol": 1e-8,
-        },
-    )
+    coarse, inverse, iterations, evaluations = objective.coarse(), None, 0, 0
+    if coarse is not None:
+        near = minimise(coarse.cost_and_gradient, start, _COARSE_PRECISION, _MOST_ITERATIONS)
+        start, inverse = near.parameters, near.inverse
+        iterations, evaluations = near.iterations, near.evaluations
+    found = minimise(objective.cost_and_gradient, start, precision, _MOST_ITERATIONS, inverse)
     return Descent(
-        cost=float(found.fun),
-        parameters=np.asarray(found.x),
-        iterations=int(found.nit),
-        evaluations=int(found.nfev),
-        gradient_norm=float(np.abs(found.jac).max()),
-        converged=found.status == 0,
+        cost=found.cost,
+        parameters=found.parameters,
+        iterations=iterations + found.iterations,
+        evaluations=evaluations + found.evaluations,
+        gradient_norm=float(np.abs(found.gradient).max()),
+        converged=found.converged,
     )
 
 

@@ -31,6 +31,13 @@ class Objective(Protocol):
         """Return random parameters from which a descent may begin, shape (size,)."""
         ...
 
+    def coarse(self) -> Objective | None:
+        """Return the same problem on a part of the pairs, None where they are few anyway.
+
+        Its cost approximates the whole one, so that the curvature found on it holds.
+        """
+        ...
+
     def surface(self, parameters: Floats) -> LimitSurface:
         """Return the surface of `parameters`."""
         ...

@@ -58,6 +58,7 @@ class PowerSumObjective:
             velocity_weight: w; 0 gives J1.
             robust_scale: See `direction_loss`.
         """
+        self._pairs = pairs
         self._arguments = (pairs, exponents, velocity_weight, robust_scale)
         self._exponents = exponents
         self._velocity_weight = velocity_weight
@@ -143,6 +144,11 @@ class PowerSumObjective:
         self._evaluate(matrices_of(factors))
         scale: Floats = self._values.mean(axis=1) * self._exponents.size
         return parameters_of(factors * (scale ** (-0.5 / self._exponents))[:, None, None])
+
+    def coarse(self) -> PowerSumObjective | None:
+        """Return the same fit to a part of the pairs, if they are very many."""
+        part = self._pairs.coarse(self.size)
+        return None if part is None else PowerSumObjective(part, *self._arguments[1:])
 
     def surface(self, parameters: Floats) -> PowerSum:
         """Return the power sum of `parameters`."""

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 _ONE_DIRECTION = 0.98
 # Relative second moment below which the loads leave a direction of load untried.
 _UNTRIED = 1e-8
+# Pairs for each parameter that show a fit where to go, and how many times more there must be.
+_COARSE_PAIRS = 12
+_COARSE_STRIDE = 4
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,19 @@ class ScaledPairs:
     def weighted(self, weights: Floats) -> ScaledPairs:
         """Return the same pairs with their weights multiplied by `weights`, shape (n,)."""
         return replace(self, weights=self.weights * weights)
+
+    def coarse(self, parameters: int) -> ScaledPairs | None:
+        """Return every so many pairs, with weights for the rest; None where they are few.
+
+        Args:
+            parameters: Of the fit; a dozen pairs are kept for each.
+        """
+        stride = len(self) // (_COARSE_PAIRS * parameters)
+        if stride < _COARSE_STRIDE:
+            return None
+        part = slice(None, None, stride)
+        weights = self.weights[part] * stride
+        return ScaledPairs(self.wrenches[part], self.directions[part], self.scaling, weights)
 
     def joined(self, other: ScaledPairs) -> ScaledPairs:
         """Return these pairs and then those of `other`, which has the same scaling."""

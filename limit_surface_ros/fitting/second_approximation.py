@@ -100,6 +100,11 @@ class SecondObjective:
         terms = PowerSumObjective(self._pairs, np.array([1.0, 0.5]), 0.0).start(rng)
         return terms[PARAMETERS_PER_MATRIX:]
 
+    def coarse(self) -> SecondObjective | None:
+        """Return the same fit to a part of the pairs, if they are very many."""
+        part = self._pairs.coarse(self.size)
+        return None if part is None else SecondObjective(part, self._velocity_weight)
+
     def surface(self, parameters: Floats) -> PowerSum:
         """Return the surface with the negative part of A dropped."""
         outer = matrices_of(factors_of(parameters))[0]
