@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 LEAST_POINTS, MOST_POINTS = 4_000, 40_000
 ROUNDS = 8
+# Places at which the largest error is looked for between the points of the grid.
+MOST_LOOKS = 200
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,18 @@ def largest_error(x: ExponentialSum, response: Target, start: float, end: float)
     """Return the largest |x - response| on [start, end] [s], on a fine grid with breakpoints."""
     times = fine_times(response, end, float(np.abs(x.rates.imag).max()))
     times = times[times >= start]
-    return float(np.abs(x(times) - response(times)).max())
+    return _highest(x, response, times, np.abs(x(times) - response(times)))
+
+
+def _highest(x: ExponentialSum, response: Target, times: Floats, errors: Floats) -> float:
+    """Return the largest error between the times too, from a closer look at the highest ones."""
+    highest = float(errors.max())
+    near = np.flatnonzero(errors >= 0.98 * highest)
+    if len(near) > MOST_LOOKS:
+        near = near[np.argsort(-errors[near])[:MOST_LOOKS]]
+    before, after = times[np.maximum(near - 1, 0)], times[np.minimum(near + 1, len(times) - 1)]
+    close = before[:, np.newaxis] + np.multiply.outer(after - before, np.linspace(0.0, 1.0, 33))
+    return max(highest, float(np.abs(x(close) - response(close)).max()))
 
 
 def fit_response(
@@ -93,9 +106,9 @@ def fit_response(
         weights, value, bound = exchange(basis, target, response, times)
     else:
         weights, value, bound = solve(basis, target, norm)
-    error = float(np.abs(basis @ weights - target).max())
     name = norm if isinstance(norm, str) else getattr(norm, "__name__", "criterion")
     x = ExponentialSum.from_weights(lambdas, weights)
+    error = _highest(x, response, times, np.abs(basis @ weights - target))
     return ResponseFit(x, name, span, error, value, bound)
 
 
