@@ -27,7 +27,7 @@ from limit_surface_ros.tools.executors import CLUSTER_IN_FLIGHT, dask_executor
 from limit_surface_ros.tools.program import FAILED, run_program
 from limit_surface_ros.tools.progress import progress_bar
 from limit_surface_ros.tools.surface_fit import add_fit_options, available_cores, fit_model
-from limit_surface_ros.tools.training_data import ACCEPTED, SUFFIXES
+from limit_surface_ros.tools.training_data import ACCEPTED, SUFFIXES, is_bag
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -42,6 +42,8 @@ EXAMPLES = """examples:
 """
 # Key in the history of a model by which a later run recognises it.
 MADE_FROM = "made_from"
+# Bags are large: they are hashed in parts [bytes].
+_READ_SIZE = 2**20
 # Options that say where and how to work, and not what model comes out.
 _WORKING_OPTIONS = ("folder", "output", "workers", "dask", "refit", "command")
 
@@ -109,9 +111,11 @@ def objects(options: argparse.Namespace) -> list[CatalogueObject]:
         raise FileError(f"{options.folder}: there is no such folder")
     if folder == output:
         raise FileError(f"{options.output}: models must go to another folder than their inputs")
-    sources = sorted(path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES)
+    sources = sorted(path for path in folder.iterdir() if is_input(path))
     if not sources:
-        raise FileError(f"{options.folder}: the folder holds no {', '.join(SUFFIXES)}")
+        raise FileError(
+            f"{options.folder}: the folder holds no {', '.join(SUFFIXES)} and no ROS 2 bag"
+        )
     taken: dict[str, Path] = {}
     for source in sources:
         other = taken.setdefault(source.stem, source)
@@ -133,13 +137,27 @@ def fit_settings(options: argparse.Namespace) -> str:
     return json.dumps(values, sort_keys=True, default=str)
 
 
+def is_input(path: Path) -> bool:
+    """Tell whether something in the folder is to be fitted."""
+    if path.is_dir():
+        return (path / "metadata.yaml").is_file()
+    return path.suffix.lower() in SUFFIXES or is_bag(path)
+
+
 def fingerprint(source: Path, settings: str) -> str:
-    """Return what stands for the content of a file and the options; empty if it is unreadable."""
+    """Return what stands for an input's content and the options; empty if it is unreadable."""
+    digest = hashlib.sha256(settings.encode())
+    files = sorted(source.rglob("*")) if source.is_dir() else [source]
     try:
-        content = source.read_bytes()
+        for file in files:
+            digest.update(b"\0")
+            if file.is_file():
+                with file.open("rb") as stream:
+                    while part := stream.read(_READ_SIZE):
+                        digest.update(part)
     except OSError:
         return ""
-    return hashlib.sha256(settings.encode() + b"\0" + content).hexdigest()
+    return digest.hexdigest()
 
 
 def is_finished(item: CatalogueObject) -> bool:

@@ -52,6 +52,27 @@ def test_a_bad_object_fails_alone_and_is_listed_at_the_end(folder, tmp_path, cap
     assert sorted(times(tmp_path / "models")) == ["object_00.yaml", "object_02.yaml"]
 
 
+def test_contacts_and_bags_are_objects_and_other_things_are_not(folder, tmp_path, capsys):
+    for path in folder.glob("object_0[1-3].csv"):
+        path.unlink()
+    (folder / "three_points.yaml").write_text(
+        "schema: 1\nname: three_points\n"
+        "points: [[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]]\n"
+        "friction_limits: [0.5, 0.5, 0.5]\n"
+    )
+    (folder / "notes.txt").touch()
+    (folder / "broken_bag").mkdir()
+    (folder / "broken_bag" / "metadata.yaml").write_text("nothing: 1\n")
+    output = folder / "models"
+    for kept in (0, 2):
+        assert run(folder, output) == 1
+        printed = capsys.readouterr()
+        assert f"3 objects: {kept} finished before" in printed.out
+        (line,) = printed.err.splitlines()
+        assert line.startswith("FAILED broken_bag: ")
+    assert sorted(times(output)) == ["object_00.yaml", "three_points.yaml"]
+
+
 def test_finished_models_are_kept_until_their_input_or_the_options_change(
     folder, tmp_path, capsys
 ):
