@@ -138,8 +138,10 @@ def main() -> int:
         for rate in (100.0, 1000.0):
             ours = [sys.executable, "-m", "limit_surface_ros.nodes.decay_node", "--ros-args"]
             ours += [*models, "-p", f"rate:={rate}", "--log-level", "warn"]
-            row = measure(node, rate, ours, "/decay/wrench", onset=True)
-            print("| " + " | ".join(["decay node", *row]) + " |")
+            for name in ("single_threaded", "events"):
+                program = [*ours, "-p", f"executor:={name}"]
+                row = measure(node, rate, program, "/decay/wrench", onset=True)
+                print("| " + " | ".join([f"decay node, {name}", *row]) + " |", flush=True)
             plain = [sys.executable, "-c", PLAIN_TIMER, str(rate)]
             row = measure(node, rate, plain, "/plain", onset=False)
             print("| " + " | ".join(["plain rclpy timer", *row]) + " |")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from geometry_msgs.msg import Vector3Stamped, WrenchStamped
 from limit_surface_interfaces.msg import DecayForecast
-from limit_surface_interfaces.srv import EvaluateDecay, PredictStop, TimeToLevel
+from limit_surface_interfaces.srv import EvaluateDecay, ListDecays, PredictStop, TimeToLevel
 
 from limit_surface_ros.decay.estimation import EstimationOptions
 from limit_surface_ros.decay.stopping import onset_value, predict_stop
@@ -17,6 +17,7 @@ from limit_surface_ros.files.decay_file import DecayModel, read_decay_model
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.nodes import convert, frames, planar_inputs, spin
 from limit_surface_ros.nodes.model_host import model_settings
+from limit_surface_ros.nodes.model_info import decay_info
 from limit_surface_ros.nodes.model_node import ModelNode
 from limit_surface_ros.nodes.onset import Onset
 from limit_surface_ros.nodes.onset_stream import OnsetStream
@@ -116,6 +117,7 @@ class DecayNode(ModelNode[DecayModel]):
         self.values.concern(["rate", "stop_below"], self._prepare_stream)
         self.add_input(WrenchStamped, "onset", self._begin, stream=False)
         self.add_input(WrenchStamped, "measurement", self._measure)
+        self.add_service(ListDecays, "list_models", self._list_models)
         self.add_service(EvaluateDecay, "evaluate", self._evaluate)
         self.add_service(TimeToLevel, "time_to_level", self._time_to_level)
         self.add_service(PredictStop, "predict_stop", self._predict_stop)
@@ -219,6 +221,11 @@ class DecayNode(ModelNode[DecayModel]):
 
     def _prepare_stream(self, values: Mapping[str, Any]) -> Callable[[], None]:
         return self._start_stream
+
+    def _list_models(self, _: ListDecays.Request, response: ListDecays.Response) -> None:
+        default = self.models.models.default
+        infos = [decay_info(model, model.name == default) for model in self.models.models]
+        response.models = sorted(infos, key=lambda info: not info.is_default)
 
     def _evaluate(self, request: EvaluateDecay.Request, response: EvaluateDecay.Response) -> None:
         model = self.models[request.model]

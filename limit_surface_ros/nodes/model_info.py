@@ -1,18 +1,21 @@
-"""A surface model as `~/list_models` tells of it."""
+"""Models as `~/list_models` tells of them."""
 
 from __future__ import annotations
 
 import functools
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import yaml
-from limit_surface_interfaces.msg import ModelInfo
+from limit_surface_interfaces.msg import DecayInfo, ModelInfo
 
 from limit_surface_ros.files.yaml_reader import plain
 from limit_surface_ros.surface.convexity import is_convex
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from limit_surface_ros.files.decay_file import DecayModel
     from limit_surface_ros.files.surface_file import SurfaceModel
     from limit_surface_ros.surface.protocol import LimitSurface
 
@@ -27,7 +30,7 @@ def _is_convex(surface: LimitSurface) -> bool:
 
 
 def model_info(model: SurfaceModel, is_default: bool) -> ModelInfo:
-    """Return the message for one model."""
+    """Return the message for one limit surface."""
     surface, scaling = model.surface, model.surface.scaling
     terms = next(len(getattr(surface, key)) for key in _TERMS if hasattr(surface, key))
     return ModelInfo(
@@ -41,5 +44,25 @@ def model_info(model: SurfaceModel, is_default: bool) -> ModelInfo:
         normal_force=math.nan if model.normal_force is None else model.normal_force,
         is_default=is_default,
         convex=_is_convex(surface),
-        fit=yaml.safe_dump(plain(dict(model.fit)), sort_keys=False) if model.fit else "",
+        fit=_text(model.fit),
     )
+
+
+def decay_info(model: DecayModel, is_default: bool) -> DecayInfo:
+    """Return the message for one decay model."""
+    return DecayInfo(
+        name=model.name,
+        terms=model.sum.terms,
+        onset_value=float(model.sum(0.0)),
+        slowest_rate=model.sum.slowest_rate,
+        bound=model.max_error,
+        bound_from=model.time_span[0],
+        bound_until=model.time_span[1],
+        is_default=is_default,
+        fit=_text(model.fit),
+    )
+
+
+def _text(fit: Mapping[str, Any]) -> str:
+    """Return how a model came about as YAML; nothing for nothing."""
+    return yaml.safe_dump(plain(dict(fit)), sort_keys=False) if fit else ""

@@ -11,7 +11,7 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
 
 from limit_surface_interfaces.msg import ErrorCode
-from limit_surface_interfaces.srv import EvaluateDecay, PredictStop, TimeToLevel
+from limit_surface_interfaces.srv import EvaluateDecay, ListDecays, PredictStop, TimeToLevel
 from std_srvs.srv import Trigger
 
 from decay_helpers import SUM, SURFACE, Bench, write_decay
@@ -46,6 +46,16 @@ def time_to_level(ros, client_node, bench):
 @pytest.fixture
 def stop(ros, client_node, bench):
     return ros.client(client_node, PredictStop, "/decay/predict_stop")
+
+
+def test_models_are_listed_with_what_tells_them_apart(ros, client_node, bench):
+    listed = ros.client(client_node, ListDecays, "/decay/list_models")(ListDecays.Request())
+    assert listed.error_code == ErrorCode.NONE
+    assert [model.name for model in listed.models] == ["kinked", "fading", "late"]
+    assert [model.is_default for model in listed.models] == [True, False, False]
+    kinked, fading = listed.models[:2]
+    assert (kinked.terms, kinked.bound, kinked.bound_until) == (SUM.terms, MAX_ERROR, 4.0)
+    assert (fading.onset_value, fading.slowest_rate) == (2.0, -0.7)
 
 
 def test_values_equal_the_library_in_any_order(evaluate):
