@@ -34,7 +34,12 @@ class BareNode(Node):
             (WrenchToTwist, "wrench_to_twist"),
             (TwistToWrench, "twist_to_wrench"),
         ):
-            self.create_service(kind, f"~/{service}", lambda _, response: response)
+            self.create_service(
+                kind,
+                f"~/{service}",
+                lambda _, response: response,
+                qos_profile=QoSProfile(depth=1000),
+            )
         self.create_service(WrenchesToTwists, "~/wrenches_to_twists", self._wrenches)
         self.create_service(TwistsToWrenches, "~/twists_to_wrenches", self._twists)
         self._publisher = self.create_publisher(TwistStamped, "~/predicted_twist", 10)

@@ -105,9 +105,22 @@ class Crowd:
         name = f"{prefix}/wrench_to_twist"
         self._clients = [self._node.create_client(WrenchToTwist, name) for _ in range(count)]
         self._left = 0
+        self._counting = threading.Lock()
         self._done = threading.Event()
-        time.sleep(1.0)
-        self.rate(count)
+        for each in self._clients:
+            self._greet(each)
+
+    def _greet(self, client: Any) -> None:
+        """Call until answered: a server drops answers to clients that it has yet to discover."""
+        client.wait_for_service(timeout_sec=10.0)
+        for _ in range(10):
+            answered = threading.Event()
+            future = client.call_async(self._request)
+            future.add_done_callback(lambda _, event=answered: event.set())
+            if answered.wait(1.0):
+                return
+            client.remove_pending_request(future)
+        raise RuntimeError("a client was never answered")
 
     def rate(self, calls: int) -> float:
         """Return calls a second."""
@@ -126,14 +139,16 @@ class Crowd:
             self._node.destroy_client(each)
 
     def _ask(self, client: Any) -> None:
-        # Answers come in the one thread of the executor: the count needs no lock.
         client.call_async(self._request).add_done_callback(lambda _: self._answered(client))
 
     def _answered(self, client: Any) -> None:
-        self._left -= 1
-        if self._left >= len(self._clients):
+        # In the executor's thread, or in the asker's if the answer was faster than it.
+        with self._counting:
+            self._left -= 1
+            left = self._left
+        if left >= len(self._clients):
             self._ask(client)
-        elif self._left == 0:
+        elif left == 0:
             self._done.set()
 
 

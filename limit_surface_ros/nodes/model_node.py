@@ -38,6 +38,8 @@ Model2 = TypeVar("Model2", bound=Named)
 
 LOG_PERIOD = 5.0
 DEPTH = 10
+# Requests that wait while one is answered: of more than the usual 10 the oldest would be lost.
+WAITING = 1000
 COMMON_SETTINGS = (*diagnostics.SETTINGS, spin.EXECUTOR)
 
 
@@ -118,7 +120,10 @@ class ModelNode(Node, Generic[Model]):
             handler: Fills the response for a request, or raises.
         """
         self.create_service(
-            service_type, f"~/{name}", functools.partial(self._answer, name, handler)
+            service_type,
+            f"~/{name}",
+            functools.partial(self._answer, name, handler),
+            qos_profile=QoSProfile(depth=WAITING),
         )
 
     def add_input(
