@@ -1,0 +1,210 @@
+"""The promise of README and docs: every code block runs, in order, as it stands.
+
+A page's blocks run in a folder of their own. Python runs as one program; a page that also holds
+bash runs as one bash script, into which each Python block is put together with those before it.
+Nodes that a page starts in "another terminal" run in the background until its end. `ros2`, `rviz2`
+and `make` are `ros2_stand_in.py` here, which runs the real programs, services and topics. Blocks
+marked as text, YAML, C++ or CMake are shown and not run; those that show whole files are included
+from files that other tests run or compile.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
+from limit_surface_ros.files.yaml_reader import write_atomically
+from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.sampling import random_motions
+from limit_surface_ros.surface.scaling import Scaling
+
+ROOT = Path(__file__).resolve().parents[2]
+STAND_IN = Path(__file__).with_name("ros2_stand_in.py")
+PAGES = sorted(
+    path
+    for path in [ROOT / "README.md", *ROOT.glob("docs/**/*.md")]
+    if path.exists() and not {"_build", "generated"} & set(path.relative_to(ROOT).parts)
+)
+SHOWN = {"text", "yaml", "cpp", "cmake", "c++", "{toctree}", "{literalinclude}", "{eval-rst}", ""}
+FENCE = re.compile(r"^(```+)([^\n`]*)\n(.*?)^\1$", re.MULTILINE | re.DOTALL)
+INDENTED = re.compile(r"(?:(?<=\n\n)|^)((?: {4}[^\n]*\n)+)", re.MULTILINE)
+NODE = re.compile(r"^ros2 run limit_surface_ros \w+_nodes? ")
+# Commands whose effect is outside of a test's reach: they are recognised and passed over.
+PASSED_OVER = ("git ", "cd ", "source ", ". ", "sudo ", "apt ", "colcon ", "pip ", "scripts/")
+
+
+@dataclass(frozen=True)
+class Block:
+    """A code block of a page."""
+
+    language: str
+    text: str
+
+
+def blocks_of(page: Path) -> list[Block]:
+    """Return the blocks that run, in order; an unknown language is an error."""
+    text = page.read_text(encoding="utf-8")
+    found: list[tuple[int, Block]] = []
+    for match in FENCE.finditer(text):
+        language = (match[2].split() or [""])[0]
+        if language not in SHOWN:
+            assert language in ("python", "bash", "console", "sh"), (
+                f"{page}: block of {language!r}"
+            )
+            found.append((match.start(), Block(language, match[3])))
+    bare = FENCE.sub(lambda match: "x" * len(match[0]), text)
+    if page.name == "README.md":
+        for match in INDENTED.finditer(bare):
+            lines = match[1].replace("\n    ", "\n").removeprefix("    ")
+            found.append((match.start(), Block("bash", lines)))
+    return [block for _, block in sorted(found, key=lambda item: item[0])]
+
+
+def commands_of(block: str) -> list[str]:
+    """Return the commands of a bash block, continuations joined, here-documents whole."""
+    commands: list[str] = []
+    lines = iter(block.splitlines())
+    for line in lines:
+        command = line
+        while command.endswith("\\"):
+            command += "\n" + next(lines)
+        end = re.search(r"<<'?(\w+)'?", command)
+        if end:
+            for inside in lines:
+                command += "\n" + inside
+                if inside == end[1]:
+                    break
+        commands.append(command)
+    return commands
+
+
+def as_bash(command: str) -> str:
+    """Return a command as the test runs it."""
+    if command.startswith(PASSED_OVER):
+        return f": passed over {shlex.quote(command)}"
+    plain = re.sub(r"\s+# .*$", "", command) if "\n" not in command else command
+    return f"{plain} &" if NODE.match(plain) else plain
+
+
+def script_of(blocks: list[Block]) -> str:
+    """Return a page as one bash script."""
+    end = "code=$?; kill $(jobs -p) 2>/dev/null || true; wait; exit $code"
+    parts = ["set -euo pipefail", f"trap '{end}' EXIT"]
+    python = ""
+    for block in blocks:
+        if block.language == "python":
+            python += block.text
+            parts.append(f"python3 - <<'END_OF_PYTHON'\n{python}END_OF_PYTHON")
+        else:
+            parts += [as_bash(command) for command in commands_of(block.text)]
+    return "\n".join(parts) + "\n"
+
+
+@pytest.fixture
+def environment(tmp_path):
+    """An environment in which the page's commands are found, in a ROS domain of its own."""
+    commands = tmp_path / "bin"
+    commands.mkdir()
+    for name in ("ros2", "rviz2", "make"):
+        line = f'exec {shlex.quote(sys.executable)} {shlex.quote(str(STAND_IN))} {name} "$@"\n'
+        write_atomically(commands / name, f"#!/bin/sh\n{line}")
+        (commands / name).chmod(0o755)
+    # A link would not find the virtual environment that this Python stands in.
+    write_atomically(commands / "python3", f'#!/bin/sh\nexec {shlex.quote(sys.executable)} "$@"\n')
+    (commands / "python3").chmod(0o755)
+    paths = [str(ROOT), os.environ.get("PYTHONPATH", "")]
+    return os.environ | {
+        "PATH": f"{commands}{os.pathsep}{os.environ['PATH']}",
+        "PYTHONPATH": os.pathsep.join(filter(None, paths)),
+        "ROS_DOMAIN_ID": str(101 + os.getpid() % 100),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+    }
+
+
+@pytest.fixture
+def own_files(tmp_path):
+    """The files that README takes the reader to have: a model, pushes, a contact."""
+    folder = tmp_path / "work"
+    folder.mkdir()
+    feet = [[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]]
+    body = PointContacts(feet, [1.0, 1.0, 1.0], Scaling(0.05, 3.0))
+    write_surface_model(SurfaceModel("mine", body), folder / "model.yaml")
+    pairs = random_motions(body, 30, 1)
+    rows = np.hstack([pairs.wrenches, pairs.twists])
+    heading = "fx_N,fy_N,tau_Nm,vx,vy,omega"
+    np.savetxt(folder / "pushes.csv", rows, delimiter=",", header=heading, comments="")
+    contact = f"schema: 1\nname: mine\npoints: {feet}\nfriction_limits: [1.0, 1.0, 1.0]\n"
+    (folder / "contact.yaml").write_text(contact)
+    return folder
+
+
+FIRST_HOUR = ROOT / "docs" / "tutorials" / "first_hour.md"
+# The first hour has a test of its own.
+WITH_CODE = [page for page in PAGES if blocks_of(page) and page != FIRST_HOUR]
+
+
+@pytest.mark.parametrize("page", WITH_CODE, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_code_block_of_a_page_runs(page, own_files, environment):
+    blocks = blocks_of(page)
+    bash = "".join(block.text for block in blocks if block.language != "python")
+    if "ros2 " in bash or "rclpy" in "".join(block.text for block in blocks):
+        pytest.importorskip("rclpy", reason="rclpy is not installed")
+        pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
+    if "plot_" in bash or "reproduce_thesis" in bash:
+        pytest.importorskip("matplotlib", reason="matplotlib draws the pictures")
+    script = script_of(blocks).replace("/path/to/", f"{own_files}/")
+    run = subprocess.run(
+        ["bash", "-c", script],
+        cwd=own_files,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=90,
+    )
+    assert run.returncode == 0, f"{run.stdout}\n{run.stderr}"
+
+
+def test_the_first_hour_ends_with_a_model_a_picture_and_answers(tmp_path, environment):
+    pytest.importorskip("rclpy", reason="rclpy is not installed")
+    pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
+    pytest.importorskip("matplotlib", reason="matplotlib draws the pictures")
+    run = subprocess.run(
+        ["bash", "-c", script_of(blocks_of(FIRST_HOUR))],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=90,
+    )
+    assert run.returncode == 0, f"{run.stdout}\n{run.stderr}"
+    assert (tmp_path / "triangle.yaml").exists()
+    assert (tmp_path / "triangle.png").read_bytes().startswith(b"\x89PNG")
+    assert "slides=True" in run.stdout
+    assert "error_code=100" in run.stdout
+    assert "median" in run.stdout
+
+
+def test_a_block_that_fails_fails_the_page(tmp_path, environment):
+    for text in ("ros2 service nonsense", "make no_such_target", "rviz2 -d absent.rviz", "false"):
+        script = script_of([Block("bash", text + "\n")])
+        run = subprocess.run(["bash", "-c", script], env=environment, capture_output=True)
+        assert run.returncode != 0, text
+    script = script_of([Block("python", "x = 1\n"), Block("python", "assert x == 2\n")])
+    assert subprocess.run(["bash", "-c", script], env=environment, capture_output=True).returncode
+
+
+def test_here_documents_and_continuations_stay_whole():
+    block = "cat > a <<'END'\nros2 run\nEND\n"
+    block += "ros2 run limit_surface_ros limit_surface_node \\\n  -p x\n"
+    document, node = commands_of(block)
+    assert document == "cat > a <<'END'\nros2 run\nEND"
+    assert as_bash(node).endswith("-p x &")
