@@ -6,6 +6,12 @@ peer's where there is one.
 
 from __future__ import annotations
 
+import os
+
+# As in the programs: threads of BLAS only wait for each other. Before numpy is imported.
+for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+    os.environ.setdefault(_variable, "1")
+
 import sys
 import warnings
 from collections.abc import Sequence
