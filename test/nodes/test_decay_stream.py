@@ -10,9 +10,10 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
 
+from limit_surface_interfaces.msg import DecayForecast
 from rclpy.parameter import Parameter
 
-from decay_helpers import LOAD, SECOND, SUM, Bench, load_of, time_of, write_decay
+from decay_helpers import LATCHED, LOAD, SECOND, SUM, Bench, load_of, time_of, write_decay
 from limit_surface_ros.decay.exponential_sum import ExponentialSum
 
 START = 100 * SECOND
@@ -71,9 +72,6 @@ def test_each_onset_gives_one_forecast_that_late_subscribers_get_too(ros, client
     assert (forecast.bound_from, forecast.bound_until) == (0.0, 6.0)
     assert forecast.end_time == pytest.approx(SUM.time_to_level(0.01 * float(SUM(0.0))))
     assert forecast.samples == 0
-    from limit_surface_interfaces.msg import DecayForecast
-
-    from decay_helpers import LATCHED
 
     late = ros.listen(client_node, DecayForecast, "/decay/forecast", LATCHED)
     ros.wait(lambda: late)

@@ -12,18 +12,20 @@ pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not b
 from node_helpers import Program
 
 
-def test_the_demonstration_prints_a_table_and_checks_it():
+@pytest.fixture(scope="module")
+def output():
     with Program("demo") as program:
-        code, output = program.ended()
-    assert code == 0, output
+        code, printed = program.ended()
+    assert code == 0, printed
+    return printed
+
+
+def test_the_demonstration_prints_a_table_and_checks_it(output):
     assert len(re.findall(r"^.*\b(?:slides|sticks)\b.*e[-+]\d\d$", output, re.MULTILINE)) == 5
     assert "round trips agree" in output
 
 
-def test_the_demonstration_shows_a_wrench_that_falls_until_sliding_stops():
-    with Program("demo") as program:
-        code, output = program.ended()
-    assert code == 0, output
+def test_the_demonstration_shows_a_wrench_that_falls_until_sliding_stops(output):
     rows = re.findall(
         r"^ *\d+\.\d{3}(?: +-?\d+\.\d{4}){3} +\d+\.\d{3}  (\w+)$", output, re.MULTILINE
     )
