@@ -9,8 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.files.surface_file import SurfaceModel
+from limit_surface_ros.fitting.dissipation import fit_dissipation
 from limit_surface_ros.fitting.multi_start import Search
+from limit_surface_ros.fitting.polynomial import fit_polynomial
 from limit_surface_ros.fitting.power_sum import fit_power_sum
+from limit_surface_ros.fitting.second_approximation import fit_second_approximation
 from limit_surface_ros.plots.thesis import bodies
 from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.power_sum import thesis_exponents
@@ -65,7 +68,8 @@ class Fit:
     @property
     def label(self) -> str:
         """For legends."""
-        return f"{LABELS[self.family]}, {self.objective}"
+        name = LABELS[self.family]
+        return name if self.family in LOADS_ALONE else f"{name}, {self.objective}"
 
 
 def _thesis(terms: int) -> Callable[[Pairs, str, Search], FitResult]:
@@ -94,15 +98,42 @@ def _norms(terms: int) -> Callable[[Pairs, str, Search], FitResult]:
     return fit
 
 
+def _dissipation(terms: int) -> Callable[[Pairs, str, Search], FitResult]:
+    def fit(pairs: Pairs, objective: str, search: Search) -> FitResult:
+        return fit_dissipation(pairs, terms, scaling=UNSCALED, search=search)
+
+    return fit
+
+
+def _polynomial(convex: bool) -> Callable[[Pairs, str, Search], FitResult]:
+    def fit(pairs: Pairs, objective: str, search: Search) -> FitResult:
+        return fit_polynomial(pairs, convex=convex, scaling=UNSCALED)
+
+    return fit
+
+
+def _second(pairs: Pairs, objective: str, search: Search) -> FitResult:
+    weight = VELOCITY_WEIGHTS[objective]
+    return fit_second_approximation(pairs, velocity_weight=weight, scaling=UNSCALED, search=search)
+
+
 FAMILIES: dict[str, Callable[[Pairs, str, Search], FitResult]] = {
     **{f"thesis{terms}": _thesis(terms) for terms in (1, 2, 3, 4)},
+    "second": _second,
+    "polynomial": _polynomial(convex=False),
     **{f"norms{terms}": _norms(terms) for terms in (3, 4)},
+    "dissipation4": _dissipation(4),
 }
 LABELS = {
     "thesis1": "1 term",
     **{f"thesis{terms}": f"{terms} terms" for terms in (2, 3, 4)},
+    "second": "2nd approximation",
+    "polynomial": "4th order polynomial",
     **{f"norms{terms}": f"{terms} norms" for terms in (3, 4)},
+    "dissipation4": "4 terms of dissipation",
 }
+# These are fitted to loads alone: an objective in their label would mislead.
+LOADS_ALONE = ("polynomial", "dissipation4")
 
 
 @cache

@@ -42,5 +42,5 @@ QUICK = Settings(
     per_facet=20,
     tests=400,
     directions=300,
-    starts=2,
+    starts=6,
 )

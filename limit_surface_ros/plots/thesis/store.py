@@ -6,6 +6,7 @@ import csv
 import hashlib
 import io
 import json
+import warnings
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,7 @@ from limit_surface_ros.files.surface_file import (
 from limit_surface_ros.files.yaml_reader import plain, write_atomically
 from limit_surface_ros.plots.canvas import save_figure
 from limit_surface_ros.plots.thesis.findings import Claim
+from limit_surface_ros.surface.convexity import NotConvexWarning
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -140,7 +142,10 @@ def csv_text(table: Table) -> str:
 
 def _read_if_there(path: Path) -> SurfaceModel | None:
     try:
-        return read_surface_model(path)
+        with warnings.catch_warnings():
+            # Some of the thesis's fits are not convex; that is a finding here and no surprise.
+            warnings.simplefilter("ignore", NotConvexWarning)
+            return read_surface_model(path)
     except FileError:
         return None
 

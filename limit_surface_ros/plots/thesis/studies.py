@@ -7,6 +7,7 @@ from limit_surface_ros.plots.thesis import (
     decay_system,
     exact_surfaces,
     more_functions,
+    surface_errors,
     surface_fits,
 )
 
@@ -16,4 +17,5 @@ STUDIES = (
     *more_functions.STUDIES,
     *exact_surfaces.STUDIES,
     *surface_fits.STUDIES,
+    *surface_errors.STUDIES,
 )
