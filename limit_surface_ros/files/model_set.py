@@ -6,6 +6,7 @@ the old one is untouched.
 
 from __future__ import annotations
 
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
@@ -13,6 +14,10 @@ from limit_surface_ros.errors import FileError, UnknownModelError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
+
+
+# Names in a message; thousands would drown the rest of it.
+_LISTED = 20
 
 
 class Named(Protocol):
@@ -60,8 +65,9 @@ class ModelSet(Generic[Model]):
         try:
             return self._models[name or self.default]
         except KeyError:
-            loaded = ", ".join(self._models)
-            raise UnknownModelError(f"no model {name!r} is loaded; loaded are {loaded}") from None
+            raise UnknownModelError(
+                f"no model {name!r} is loaded; loaded are {self.listed()}"
+            ) from None
 
     def __iter__(self) -> Iterator[Model]:
         """Iterate over the models in the order of their files."""
@@ -70,6 +76,13 @@ class ModelSet(Generic[Model]):
     def __len__(self) -> int:
         """Return the number of models."""
         return len(self._models)
+
+    def listed(self) -> str:
+        """Return the names of the models for people: the first few, and how many more."""
+        names = [*islice(self._models, _LISTED)]
+        if len(self) > _LISTED:
+            names[-1] += f" and {len(self) - _LISTED} more"
+        return ", ".join(names)
 
 
 def model_paths(entries: Iterable[str | Path]) -> list[Path]:

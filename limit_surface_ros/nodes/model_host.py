@@ -85,8 +85,8 @@ class ModelHost(Generic[Model]):
     @property
     def summary(self) -> str:
         """What is loaded, for people."""
-        names = ", ".join(model.name for model in self.models)
-        return f"{len(self.models)} loaded: {names}; default {self.models.default}"
+        models = self.models
+        return f"{len(models)} loaded: {models.listed()}; default {models.default}"
 
     def _prepare(self, values: Values) -> Callable[[], None]:
         files, default = (values[name] for name in self.names)

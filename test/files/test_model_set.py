@@ -33,6 +33,14 @@ def test_an_unknown_name_is_refused_with_the_names_that_are_loaded():
         ModelSet([Named("a")], "c")
 
 
+def test_of_thousands_of_models_a_message_lists_a_few():
+    models = ModelSet([Named(f"object_{i:04d}") for i in range(1000)])
+    assert models.listed().endswith("object_0019 and 980 more")
+    with pytest.raises(UnknownModelError) as refused:
+        models["none"]
+    assert len(str(refused.value)) < 400
+
+
 def test_two_models_of_one_name_and_no_model_at_all_are_refused():
     with pytest.raises(FileError, match="two model files hold a model named 'a'"):
         ModelSet([Named("a"), Named("a")])
