@@ -56,7 +56,8 @@ def setup(app):
                 # An example of a file, or a table: shown as it stands.
                 marked += [".. code-block:: text", "", *(f"   {row}" for row in rows), ""]
             else:
-                marked += [*map(as_markup, rows), ""]
+                # The block that follows `::` is marked above.
+                marked += [*map(as_markup, re.sub("::$", ":", paragraph).split("\n")), ""]
         lines[:] = marked
 
     app.connect("autodoc-process-docstring", mark_up, priority=100)

@@ -101,14 +101,14 @@ def first_view(settings: Settings, store: Store) -> Findings:
     """Figure 2.2: the kernel from two numbers of samples."""
     fine, coarse = (kernel_of("f1", n) for n in (settings.samples, settings.samples // 2))
     found = fine.impulses
+    names = [f"{len(kernel.sampled.times) + 1} samples" for kernel in (fine, coarse)]
     claim = Claim(
         "The kernel has impulses at 0 and 1, both of unit size.",
         f"Found at {_listed(found.delays, 4)} s with strengths {_listed(found.strengths, 5)} "
-        f"({settings.samples} samples) and {_listed(coarse.impulses.strengths, 5)} (half as "
-        "many). Exact: -1 at 0 and +1 at 1 s, and nothing else.",
+        f"({names[0]}; the kink lies on the grid) and {_listed(coarse.impulses.strengths, 5)} "
+        f"({names[1]}). Exact: -1 at 0 and +1 at 1 s, and nothing else.",
         len(found.delays) == 2 and bool(np.abs(np.abs(found.strengths) - 1.0).max() < 5e-3),
     )
-    names = (f"{settings.samples} samples", f"{settings.samples // 2} samples")
     with new_figure(6.5, 4.6) as figure:
         above, below = figure.subplots(2, 1, sharex=True)
         for axes in (above, below):

@@ -18,6 +18,7 @@ from limit_surface_ros.plots.canvas import (
 )
 from limit_surface_ros.plots.thesis.findings import Claim, Findings, Study
 from limit_surface_ros.plots.thesis.fits import Fit, body_of, fitted, test_pairs
+from limit_surface_ros.surface.convexity import is_convex
 from limit_surface_ros.surface.measures import (
     empirical_distribution,
     force_error,
@@ -62,6 +63,7 @@ class Errors:
         store: Where they are.
 
     Attributes:
+        dented: Share of the directions of load in which a fit is not convex.
         velocity: Errors of unit twists by fit, sorted.
         force: Errors of load by fit, sorted.
     """
@@ -70,11 +72,13 @@ class Errors:
         """Measure every fit on fresh motions and in every direction of load."""
         settings = store.settings
         directions = random_directions(settings.directions, settings.seed + 2000)
+        self.dented: dict[Fit, float] = {}
         self.velocity: dict[Fit, Floats] = {}
         self.force: dict[Fit, Floats] = {}
         for fit in fits:
             surface = fitted(fit, store)
             pairs = test_pairs(fit.body, fit.noisy, settings)
+            self.dented[fit] = is_convex(surface).dented_share
             self.velocity[fit] = np.sort(velocity_error(surface, pairs))
             self.force[fit] = np.sort(force_error(surface, body_of(fit.body), directions))
 
@@ -117,9 +121,12 @@ def error_study(body: str, noisy: bool) -> Callable[[Settings, Store], Findings]
                 "quantiles": quantile_table(errors, beyond),
             },
             claims,
-            f"Noise of standard deviation {settings.noise:g} on loads and on unit motions."
-            if noisy
-            else "",
+            (
+                f"Noise of standard deviation {settings.noise:g} on loads and on unit motions. "
+                if noisy
+                else ""
+            )
+            + _convexity(errors, beyond),
         )
 
     return study
@@ -225,6 +232,7 @@ def quantile_table(*groups: Errors) -> dict[str, list[float] | list[str]]:
         rows = np.array([quantiles(getattr(errors, which)[fit]) for fit, errors in fits.items()])
         for column, level in enumerate(("50 %", "95 %", "100 %")):
             table[f"{which} {level}"] = rows[:, column].tolist()
+    table["not convex in %"] = [100.0 * errors.dented[fit] for fit, errors in fits.items()]
     return table
 
 
@@ -247,6 +255,15 @@ def _draw(axes: Axes, errors: Mapping[Fit, Floats], label: str) -> None:
         axes.plot(sizes, 100.0 * shares, dashes, color=_COLOURS[fit.family], label=fit.label)
     # The last percent may be far out and would squeeze the rest.
     axes.set(xlabel=label, ylim=(0.0, 101.0), xlim=(0.0, _reach(errors)))
+
+
+def _convexity(*groups: Errors) -> str:
+    """Say which fits are not convex, and where nothing has to be checked."""
+    dented = {f.label: share for errors in groups for f, share in errors.dented.items() if share}
+    if not dented:
+        return "All fits are convex."
+    shares = ", ".join(f"{label} {100.0 * share:.1f} %" for label, share in dented.items())
+    return f"Not convex, in this share of the directions of load: {shares}. All others are convex."
 
 
 def _reach(errors: Mapping[Fit, Floats]) -> float:
