@@ -18,6 +18,7 @@ from limit_surface_ros.surface.sphere import even_directions
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.surface.dissipation_terms import DissipationTerms
+    from limit_surface_ros.surface.gauge_inverse import Inverse
     from limit_surface_ros.surface.one_load import Term, Vector
 
 # Twists that the inverse may start from.
@@ -56,7 +57,11 @@ class DissipationSurface(ScaledSurface):
         return free
 
     @cached_property
-    def _inverse(self) -> ConvexInverse:
+    def _inverse(self) -> Inverse:
+        return self._inverse_of_any
+
+    @cached_property
+    def _inverse_of_any(self) -> ConvexInverse:
         terms = self._terms
         if len(self._free):
             # A resistance within one norm keeps the least twist at zero along the free motions.

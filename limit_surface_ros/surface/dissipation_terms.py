@@ -101,7 +101,8 @@ class PointTerms:
         limits = np.bincount(place.ravel(), weights=limits[limits > 0.0]).astype(np.float64)
         x, y = points.T
         ones = np.ones_like(x)
-        self._limits = limits
+        self.points = points
+        self.limits = limits
         self._x, self._y = x[:, np.newaxis], y[:, np.newaxis]
         self._reach = max(1.0, float(np.hypot(x, y).max()))
         self._load_moments = limits * np.array([ones, x, y])
@@ -128,7 +129,7 @@ class PointTerms:
             wx *= wx
             wy *= wy
             wx += wy
-            total += self._limits[part] @ np.sqrt(wx, out=wx)
+            total += self.limits[part] @ np.sqrt(wx, out=wx)
         return total
 
     def derivatives(self, twists: Floats, smoothing: Floats) -> tuple[Floats, Floats, Floats]:
@@ -140,7 +141,7 @@ class PointTerms:
         for part in self._parts(twists.shape[1]):
             ex, ey = self._velocities(twists, part)
             speed = self._speeds(ex, ey, twists, softness)
-            total += self._limits[part] @ np.where(speed < np.inf, speed, 0.0)
+            total += self.limits[part] @ np.where(speed < np.inf, speed, 0.0)
             slowness = np.divide(1.0, speed, out=speed)
             ex *= slowness
             ey *= slowness
@@ -173,13 +174,13 @@ class PointTerms:
         kinks = np.array([y, -x, ones]).T
         jacobians = np.array([[ones, zeros, -y], [zeros, ones, x]])
         _, gradients, hessians = self.derivatives(kinks.T, np.zeros(len(kinks)))
-        roots = (self._limits * jacobians).transpose(2, 0, 1)
+        roots = (self.limits * jacobians).transpose(2, 0, 1)
         return Corners.of_norms(kinks, roots, gradients, hessians)
 
     def _parts(self, columns: int) -> Iterator[slice]:
         """Yield slices of points, so short that arrays of them by motions stay in the cache."""
         count = max(1, _ELEMENTS // max(columns, 1))
-        for start in range(0, len(self._limits), count):
+        for start in range(0, len(self.limits), count):
             yield slice(start, start + count)
 
     def _velocities(self, twists: Floats, part: slice) -> tuple[Floats, Floats]:

@@ -84,9 +84,8 @@ class ConvexInverse:
             SolverError: A point could not be certified.
         """
         units = normals / np.sqrt((normals * normals).sum(axis=0))
-        start = np.argmax(units.T @ self._starts, axis=1)
-        points = self._starts[:, start]
-        initial = np.ones(len(start)), self._gradients[:, start], self._hessians[:, :, start]
+        points, gradients, hessians = self.starts(units)
+        initial = np.ones(units.shape[1]), gradients, hessians
         smooth = np.arange(units.shape[1])
         if self._corners is not None:
             distance, near = self._corners.nearest(units)
@@ -106,6 +105,11 @@ class ConvexInverse:
             )
         points /= self._gauge.values(points)
         return points, (normals * points).sum(axis=0)
+
+    def starts(self, normals: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return starts (3, m) for vectors (3, m), with their gradients and Hessians (3, 3, m)."""
+        which = np.argmax(normals.T @ self._starts, axis=1)
+        return self._starts[:, which], self._gradients[:, which], self._hessians[:, :, which]
 
     def starts_of_one(self, normal: Floats) -> Floats:
         """Return the start for one vector (3,), none where a corner might be the answer."""
@@ -186,7 +190,7 @@ class PeakInverse:
             for _ in range(_BOUND_STEPS):
                 ellipsoids = self._gauge.ellipsoids(points / np.abs(points).max(axis=0))
                 points = np.einsum("mij,jm->im", ellipsoids, units)
-        points, _ = plane_minimum(self._gauge, units, points, np.zeros(units.shape[1]))
+        points, _, _ = plane_minimum(self._gauge, units, points, np.zeros(units.shape[1]))
         return points / self._gauge.values(points)
 
 

@@ -26,6 +26,8 @@ _LAST_STEP = 1e-8
 # and where no step lowers the gauge any more; there that sine must be below the second.
 _TARGET = 1e-14
 _ACCEPTED = 1e-9
+# A larger sine before a last step may come from a kink that drew Newton's method in.
+_PARALLEL = 1e-6
 _STEPS = 25
 _HALVINGS = 40
 # Relative smoothing of the kinks where Newton's method alone does not settle.
@@ -55,25 +57,31 @@ def certain_minimum(
 ) -> Floats:
     """Return the points (3, m) where n.x = 1 and the gauge is least; see `plane_minimum`.
 
-    Where Newton's method does not settle the minimum is near a kink: it is then followed while
-    the kinks sharpen, along a path that is straight in the end.
+    Where Newton's method does not settle, or ends with the gradient at an angle to n, a kink is
+    near: the minimum is then followed while the kinks sharpen, along a path that is straight in
+    the end. The lower end of the two is the answer.
 
     Raises:
         SolverError: A minimum could not be certified.
     """
-    found, settled = plane_minimum(gauge, normals, starts, np.zeros(starts.shape[1]), initial)
-    hard = np.flatnonzero(~settled)
+    found, settled, sines = plane_minimum(
+        gauge, normals, starts, np.zeros(starts.shape[1]), initial
+    )
+    hard = np.flatnonzero(~settled | (sines > _PARALLEL))
     if len(hard) == 0:
         return found
     path = before = found[:, hard]
     for size in _SMOOTHINGS:
         start = path + _RATIO * (path - before)
         before = path
-        path, settled = plane_minimum(gauge, normals[:, hard], start, np.full(len(hard), size))
-    if not settled.all():
-        normal = normals[:, hard[np.argmin(settled)]].tolist()
+        path, ended, _ = plane_minimum(gauge, normals[:, hard], start, np.full(len(hard), size))
+    certain = ended | settled[hard]
+    if not certain.all():
+        normal = normals[:, hard[np.argmin(certain)]].tolist()
         raise SolverError(f"no answer could be certified for the scaled direction {normal}")
-    found[:, hard] = path
+    lower = gauge.values(path) < gauge.values(found[:, hard])
+    better = ended & (lower | ~settled[hard])
+    found[:, hard[better]] = path[:, better]
     return found
 
 
@@ -83,8 +91,10 @@ def plane_minimum(
     starts: Floats,
     smoothing: Floats,
     initial: Derivatives | None = None,
-) -> tuple[Floats, Bools]:
-    """Return the points (3, m) where n.x = 1 and the gauge is least, and which are certain.
+) -> tuple[Floats, Bools, Floats]:
+    """Return the points (3, m) where n.x = 1 and the gauge is least, and which have settled (m,).
+
+    Beside them go the sines (m,) of the angles between gradient and normal before the last steps.
 
     Newton's method with a line search in the two directions across each normal, all columns at
     once. Where the gauge is not convex the minimum is a local one.
@@ -100,16 +110,18 @@ def plane_minimum(
     points = starts * scale
     result = points.copy()
     settled = np.zeros(points.shape[1], dtype=bool)
+    angles = np.zeros(points.shape[1])
     todo = np.arange(points.shape[1])
-    basis = _plane_basis(normals)
+    basis = plane_basis(normals)
     if initial is None:
         values, gradients, hessians = gauge.derivatives(points, smoothing)
     else:
         values, gradients, hessians = initial[0] * scale, initial[1], initial[2] / scale
     for _ in range(_STEPS):
-        moves, slopes, sines = _newton_moves(normals, basis, points, gradients, hessians)
+        moves, slopes, sines = newton_moves(normals, basis, points, gradients, hessians)
         lengths = np.sqrt((moves * moves).sum(axis=0) / (points * points).sum(axis=0))
         last = lengths <= _LAST_STEP
+        angles[todo] = sines
         settled[todo] = last | (sines < _ACCEPTED)
         result[:, todo] = points + np.where(last, moves, 0.0)
         keep = ~last & (sines > _TARGET)
@@ -126,10 +138,10 @@ def plane_minimum(
             todo, normals, smoothing = todo[moved], normals[:, moved], smoothing[moved]
             points, basis, values = points[:, moved], basis[:, :, moved], values[moved]
             gradients, hessians = gradients[:, moved], hessians[:, :, moved]
-    return result, settled
+    return result, settled, angles
 
 
-def _newton_moves(
+def newton_moves(
     normals: Floats, basis: Floats, points: Floats, gradients: Floats, hessians: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Return Newton's moves (3, m) in the planes, slopes along them, and sines (m,)."""
@@ -201,7 +213,7 @@ def _line_search(
     return trial, moved, new_values, gradients, hessians
 
 
-def _plane_basis(normals: Floats) -> Floats:
+def plane_basis(normals: Floats) -> Floats:
     """Return for unit vectors (3, m) two unit vectors across each and each other, (2, 3, m)."""
     x, y, z = normals
     sign = np.where(z >= 0.0, 1.0, -1.0)

@@ -13,13 +13,17 @@ from limit_surface_ros.errors import GeometryError, RangeError, ShapeError
 from limit_surface_ros.surface.dissipation import Dissipation
 from limit_surface_ros.surface.dissipation_surface import DissipationSurface
 from limit_surface_ros.surface.dissipation_terms import PointTerms
+from limit_surface_ros.surface.many_points import ManyPointsInverse
 from limit_surface_ros.surface.scaling import Scaling
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.gauge_inverse import Inverse
 
-# Points times motions in one block.
-_ELEMENTS = 2**18
+# Points from which their sums are the cost of a twist, and single precision pays.
+_MANY = 64
+# Scaled distance of the points from the reference point beyond which it does not.
+_FAR = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +107,10 @@ class PointContacts(DissipationSurface):
             self.friction_limits / self.scaling.friction_force,
         )
 
-    @property
-    def _block_columns(self) -> int:
-        return max(64, min(4096, _ELEMENTS // len(self.points)))
+    @cached_property
+    def _inverse(self) -> Inverse:
+        general = self._inverse_of_any
+        terms = self._terms
+        if len(terms.points) < _MANY or np.abs(terms.points).max() > _FAR:
+            return general
+        return ManyPointsInverse(terms.points, terms.limits, general)

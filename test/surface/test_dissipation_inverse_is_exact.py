@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from limit_surface_ros.surface import measures, sampling
@@ -53,6 +53,20 @@ def test_a_facet_gives_its_own_rotation(seed, count):
     assert measures.angle_error(contacts.dissipation(), pairs).max() < 1e-6
 
 
+@settings(max_examples=25)
+@given(seeds, st.integers(64, 1500), st.booleans(), st.sampled_from([0.0, 0.5, 20.0]))
+def test_many_support_points_are_solved_as_exactly_as_few(seed, count, uneven, away):
+    rng = np.random.default_rng(seed)
+    limits = rng.uniform(0.1, 1.0, count) ** (20 if uneven else 1)
+    points = 0.1 * rng.standard_normal((count, 2)) + 0.1 * away
+    contacts = PointContacts(points, limits, Scaling(0.1, limits.sum()))
+    pairs = sampling.random_motions(contacts, 70, seed)
+    np.testing.assert_allclose(contacts.load_factor(pairs.wrenches), 1.0, rtol=1e-12)
+    assert measures.angle_error(contacts, pairs).max() < 1e-8
+    facets = sampling.facet_loads(contacts, 5, seed)
+    assert measures.angle_error(contacts, facets).max() < 1e-10
+
+
 @given(seeds, st.integers(1, 6), st.integers(1, 3))
 def test_any_load_lies_in_the_normal_cone_of_its_twist(seed, terms, rank):
     rng = np.random.default_rng(seed)
@@ -64,7 +78,7 @@ def test_any_load_lies_in_the_normal_cone_of_its_twist(seed, terms, rank):
 
 
 @pytest.mark.parametrize("outside", [0.0, 1e-13, 1e-10, 1e-7, 1e-4, 1e-2])
-@pytest.mark.parametrize("count", [2, 3, 40])
+@pytest.mark.parametrize("count", [2, 3, 40, 300])
 def test_loads_at_the_rim_of_a_facet_are_in_its_normal_cone(outside, count):
     rng = np.random.default_rng(count)
     contacts = random_contacts(rng, count)
@@ -77,9 +91,10 @@ def test_loads_at_the_rim_of_a_facet_are_in_its_normal_cone(outside, count):
     assert_in_normal_cones(contacts, rim)
 
 
-def test_a_line_of_points_pulled_across_is_solved_at_its_corners():
-    x = np.linspace(-1.0, 1.0, 41)
-    line = PointContacts(np.stack([x, np.zeros(41)], axis=1), np.full(41, 1.0 / 41))
+@pytest.mark.parametrize("count", [41, 101])
+def test_a_line_of_points_pulled_across_is_solved_at_its_corners(count):
+    x = np.linspace(-1.0, 1.0, count)
+    line = PointContacts(np.stack([x, np.zeros(count)], axis=1), np.full(count, 1.0 / count))
     forces = np.linspace(-1.0, 1.0, 60)
     loads = np.stack([np.zeros(60), forces, 0.3 * np.ones(60)], axis=1)
     assert_in_normal_cones(line, loads)

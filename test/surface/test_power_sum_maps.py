@@ -105,6 +105,20 @@ def test_no_load_on_the_surface_has_more_power_than_the_one_found(seed, rank, co
     assert ((pairs.twists @ probes.T).max(axis=1) <= power * (1.0 + 1e-9)).all()
 
 
+def test_a_near_kink_beside_the_way_does_not_stop_the_climb():
+    roots = np.array(
+        [
+            [[0.01987, -0.00706, -0.0047], [0.0, 0.01944, 0.02869]],
+            [[0.28763, 0.17764, -0.5661], [0.0, 0.09627, -0.07476]],
+            [[1.13444, 0.54292, -0.11681], [0.0, -0.19973, 0.13726]],
+        ]
+    )
+    surface = PowerSum(np.swapaxes(roots, 1, 2) @ roots, [0.72783, 0.57382, 0.51007])
+    twist = np.array([0.09845, 0.32652, 0.94005])
+    back = surface.twist_of_wrench(surface.wrench_of_twist(twist))
+    np.testing.assert_allclose(back, twist / np.linalg.norm(twist), atol=1e-7)
+
+
 @pytest.mark.parametrize("exponent", [0.5, 0.25])
 def test_a_load_that_one_term_does_not_see_is_a_corner_with_a_cone_of_twists(exponent):
     surface = PowerSum([np.eye(3), np.diag([1.0, 1.0, 0.0])], [1.0, exponent])
