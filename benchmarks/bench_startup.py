@@ -5,72 +5,68 @@ Needs a sourced ROS 2 with this package built; `make bench` sees to it.
 
 from __future__ import annotations
 
-import os
-import signal
+import shlex
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rclpy
 from limit_surface_interfaces.srv import WrenchToTwist
+from node_processes import OURS, isolate, process, resident, wrench_message
 from std_srvs.srv import Trigger
 
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
 from limit_surface_ros.surface.power_sum import PowerSum
 
 if TYPE_CHECKING:
-    from rclpy.client import Client
-    from rclpy.node import Node
+    from collections.abc import Sequence
 
-HERE = Path(__file__).resolve().parent
 ROUNDS = 9
 GOAL = 0.3
 MODELS = (1, 1_000, 10_000)
 PATIENCE = 120.0
 SLOW_MODULES = ("scipy", "scipy.optimize", "matplotlib", "limit_surface_ros.fitting")
-NODE = [sys.executable, "-m", "limit_surface_ros.nodes.limit_surface_node"]
-EMPTY = [sys.executable, str(HERE / "empty_node.py")]
+EMPTY = [sys.executable, str(Path(__file__).with_name("empty_node.py"))]
+QUESTION = (
+    WrenchToTwist,
+    "limit_surface/wrench_to_twist",
+    WrenchToTwist.Request(wrench=wrench_message((1.0, 0.0, 0.0))),
+)
 
 
 def first_answer(
-    asker: Node, client: Client, request: object, command: list[str]
-) -> tuple[float, float, object]:
-    """Start a node, call it until it answers, end it.
+    service_type: Any, name: str, request: Any, command: Sequence[str]
+) -> tuple[float, float, Any]:
+    """Start a node, call a service of it until it answers, end it.
+
+    Who asks is new each time: an old participant finds one that takes the place of another only
+    after seconds.
 
     Returns:
         Time from process start to the answer [s], resident memory then [MB], and the answer.
     """
-    begin = time.perf_counter()
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    rclpy.init()
+    asker = rclpy.create_node("asker")
+    client = asker.create_client(service_type, name)
     try:
-        while not client.service_is_ready():
-            assert process.poll() is None, f"{command} ended"
-            assert time.perf_counter() - begin < PATIENCE, f"{command} does not answer"
-            time.sleep(0.002)
-        future = client.call_async(request)
-        rclpy.spin_until_future_complete(asker, future, timeout_sec=PATIENCE)
-        seconds = time.perf_counter() - begin
-        return seconds, resident(process.pid), future.result()
+        begin = time.perf_counter()
+        with process(command) as running:
+            while not client.service_is_ready():
+                if running.poll() is not None or time.perf_counter() - begin > PATIENCE:
+                    raise RuntimeError(f"{shlex.join(command)} does not answer")
+                time.sleep(0.002)
+            future = client.call_async(request)
+            rclpy.spin_until_future_complete(asker, future, timeout_sec=PATIENCE)
+            seconds = time.perf_counter() - begin
+            return seconds, resident(running.pid) / 1024, future.result()
     finally:
-        process.send_signal(signal.SIGINT)
-        process.wait()
-        # The next one must be discovered anew.
-        while client.service_is_ready():
-            time.sleep(0.002)
-
-
-def resident(pid: int) -> float:
-    """Return the resident memory of a process [MB]; NaN where the system does not tell."""
-    status = Path(f"/proc/{pid}/status")
-    if not status.exists():
-        return float("nan")
-    (line,) = (line for line in status.read_text().splitlines() if line.startswith("VmRSS"))
-    return int(line.split()[1]) / 1024
+        asker.destroy_node()
+        rclpy.shutdown()
 
 
 def write_models(folder: Path, count: int) -> None:
@@ -115,12 +111,12 @@ def imports() -> None:
     print(f"\nOf {', '.join(SLOW_MODULES)}, the node's import brings: {found} (goal: none).\n")
 
 
-def start_up(asker: Node, ours: Client, empty: Client, request: WrenchToTwist.Request) -> None:
+def start_up() -> None:
     """Print the time to the first answer of the node and of an empty one."""
     times: dict[str, list[float]] = {"empty": [], "ours": []}
     for _ in range(ROUNDS):
-        times["empty"].append(first_answer(asker, empty, Trigger.Request(), EMPTY)[0])
-        times["ours"].append(first_answer(asker, ours, request, NODE)[0])
+        times["empty"].append(first_answer(Trigger, "empty", Trigger.Request(), EMPTY)[0])
+        times["ours"].append(first_answer(*QUESTION, OURS)[0])
     middle = {name: median(values) for name, values in times.items()}
     more = middle["ours"] - middle["empty"]
     print("### From process start to the first answered call\n")
@@ -132,7 +128,7 @@ def start_up(asker: Node, ours: Client, empty: Client, request: WrenchToTwist.Re
     print(f"\nOurs takes {more:.2f} s more (goal: at most {GOAL} s: {verdict}).\n", flush=True)
 
 
-def many_models(asker: Node, client: Client, request: WrenchToTwist.Request) -> None:
+def many_models() -> None:
     """Print start-up time and memory with few and with many models."""
     print("### Many models in one node\n")
     print("| models | first answer [s] | resident memory [MB] | each model [ms] | [kB] |")
@@ -141,9 +137,10 @@ def many_models(asker: Node, client: Client, request: WrenchToTwist.Request) -> 
     for count in MODELS:
         with tempfile.TemporaryDirectory() as name:
             write_models(Path(name), count)
-            command = [*NODE, "--ros-args", "-p", f"model_files:=[{name}]"]
-            seconds, memory, answer = first_answer(asker, client, request, command)
-        assert answer.error_code == 0, answer.error_msg
+            command = [*OURS, "--ros-args", "-p", f"model_files:=[{name}]"]
+            answers = [first_answer(*QUESTION, command) for _ in range(3)]
+        seconds, memory = (median(answer[i] for answer in answers) for i in range(2))
+        assert answers[0][2].error_code == 0, answers[0][2].error_msg
         base = base if any(base) else (seconds, memory)
         each = ((seconds - base[0]) / count * 1e3, (memory - base[1]) / count * 1e3)
         print(f"| {count} | {seconds:.2f} | {memory:.0f} | {each[0]:.2f} | {each[1]:.1f} |")
@@ -152,17 +149,9 @@ def many_models(asker: Node, client: Client, request: WrenchToTwist.Request) -> 
 def main() -> None:
     """Print all tables."""
     imports()
-    # Other robots in the network are not part of the measurement.
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    rclpy.init()
-    asker = rclpy.create_node("bench_startup")
-    request = WrenchToTwist.Request()
-    request.wrench.header.frame_id = "object"
-    request.wrench.wrench.force.x = 1.0
-    ours = asker.create_client(WrenchToTwist, "limit_surface/wrench_to_twist")
-    start_up(asker, ours, asker.create_client(Trigger, "empty"), request)
-    many_models(asker, ours, request)
-    rclpy.shutdown()
+    isolate()
+    start_up()
+    many_models()
 
 
 if __name__ == "__main__":
