@@ -14,6 +14,7 @@ import json
 import shlex
 import sys
 import time
+import warnings
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,6 +24,7 @@ from limit_surface_ros.errors import FileError, LimitSurfaceError
 from limit_surface_ros.files.surface_file import read_surface_model, write_surface_model
 from limit_surface_ros.fitting.catalogue import Outcome, outcomes
 from limit_surface_ros.fitting.worker_processes import worker_processes
+from limit_surface_ros.surface.convexity import NotConvexWarning
 from limit_surface_ros.tools.executors import CLUSTER_IN_FLIGHT, dask_executor
 from limit_surface_ros.tools.program import FAILED, run_program
 from limit_surface_ros.tools.progress import progress_bar
@@ -163,7 +165,10 @@ def fingerprint(source: Path, settings: str) -> str:
 def is_finished(item: CatalogueObject) -> bool:
     """Tell whether the model of an object is there, whole, and made from what stands there now."""
     try:
-        history = read_surface_model(item.target).fit
+        with warnings.catch_warnings():
+            # That a model is not convex was said when it was fitted.
+            warnings.simplefilter("ignore", NotConvexWarning)
+            history = read_surface_model(item.target).fit
     except LimitSurfaceError:
         return False
     return bool(item.made_from) and history.get(MADE_FROM) == item.made_from
