@@ -37,7 +37,11 @@ def imported_modules(folder: Path) -> dict[str, Path]:
                 continue
             for name in names:
                 found.setdefault(name.partition(".")[0], path.relative_to(ROOT))
-    helpers = [*(ROOT / "scripts").rglob("*.py"), *(ROOT / "test").glob("*.py")]
+    helpers = [
+        *(ROOT / "scripts").rglob("*.py"),
+        *(ROOT / "docs").glob("*.py"),
+        *(ROOT / "test").glob("*.py"),
+    ]
     own = {NAME, *(path.stem for path in helpers)}
     return {
         name: path
