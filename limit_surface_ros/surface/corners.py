@@ -13,12 +13,12 @@ if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
 
 # Relative width of the rim that counts as part of a cone of normals.
-_RIM = 1e-12
+RIM = 1e-12
 _NO_POWER = 1e-100
 # Elements of one array of normals by corners, of which several stay in the processor's cache.
 _ELEMENTS = 2**14
 # Curvature below which a surface counts as flat beside a corner.
-_FLAT = 1e-3
+FLAT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -80,9 +80,9 @@ class Corners:
         q -= self.centres[which].T
         distance = np.hypot(q[0], q[1])
         # The rim belongs to the cone.
-        distance[distance <= 1.0 + _RIM] = 1.0
+        distance[distance <= 1.0 + RIM] = 1.0
         # |y| - q.y + y'My/2 in y = R_k (x - x_k) is least near y along q, this far out:
-        bend = np.einsum("im,mij,jm->m", q, self.bends[which], q) + _FLAT * distance**2
+        bend = np.einsum("im,mij,jm->m", q, self.bends[which], q) + FLAT * distance**2
         y = q * np.maximum((distance - 1.0) * distance / bend, 0.0)
         move = np.einsum("mij,im->jm", self.inverses[which], y)
         kink = self.points[which].T

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from functools import cached_property
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from limit_surface_ros.surface.dissipation_terms import FormTerms
 from limit_surface_ros.surface.gauge_inverse import ConvexInverse
 from limit_surface_ros.surface.one_load import norm_gradient_of_one, one_load_terms
+from limit_surface_ros.surface.one_motion import OneMotion
 from limit_surface_ros.surface.quadratic_form import root_of
 from limit_surface_ros.surface.scaled_surface import ScaledSurface
 from limit_surface_ros.surface.sphere import even_directions
@@ -29,6 +31,9 @@ _FREE = 1e-12
 _FEW = 30
 # Relative eigenvalue below which a motion counts as resisted by nothing.
 _NO_RESISTANCE = 1e-14
+# Sizes of one wrench between which no number runs out on the way.
+_SMALLEST = 1e-100
+_LARGEST = 1e100
 
 
 class DissipationSurface(ScaledSurface):
@@ -78,6 +83,45 @@ class DissipationSurface(ScaledSurface):
             return None
         roots = np.array([root_of(form) for form in forms])
         return one_load_terms(roots, np.full(len(forms), 0.5), self.scaling.twist_unit)
+
+    @cached_property
+    def _one_motion(self) -> OneMotion | None:
+        """The inverse for one load; None where numpy is the quicker, or care is needed."""
+        forms = self.scaled_forms
+        if len(forms) > _FEW or len(self._free):
+            return None
+        return OneMotion(np.array([root_of(form) for form in forms]), self._inverse_of_any)
+
+    def _twist_of_one(self, wrench: Vector) -> Vector | None:
+        found = self._motion_of_one(wrench)
+        if found is None:
+            return None
+        (x, y, z), _ = found
+        length = sqrt(x * x + y * y + z * z)
+        return x / length, y / length, z / (length * self.scaling.characteristic_length)
+
+    def _load_factor_of_one(self, wrench: Vector) -> float | None:
+        found = self._motion_of_one(wrench)
+        if found is None:
+            return None
+        return found[1]
+
+    def _motion_of_one(self, wrench: Vector) -> tuple[Vector, float] | None:
+        """Return the scaled motion v with D(v) = 1 under one wrench, and its power, the factor."""
+        inverse = self._one_motion
+        if inverse is None:
+            return None
+        force = self.scaling.friction_force
+        x, y, z = wrench[0], wrench[1], wrench[2] / self.scaling.characteristic_length
+        size = abs(x) + abs(y) + abs(z)
+        if not _SMALLEST < size < _LARGEST:
+            return None
+        load = (x / size, y / size, z / size)
+        motion = inverse.of_load(load)
+        if motion is None:
+            return None
+        power = motion[0] * load[0] + motion[1] * load[1] + motion[2] * load[2]
+        return motion, power * (size / force)
 
     def _wrench_of_one(self, twist: Vector) -> Vector | None:
         terms = self._one_twist_terms

@@ -71,7 +71,7 @@ class ConvexInverse:
             corners: Corners of the surface, if it has any.
         """
         self._gauge = gauge
-        self._corners = corners
+        self.corners = corners
         values, gradients, hessians = gauge.derivatives(directions, np.zeros(directions.shape[1]))
         self._starts = directions / values
         self._gradients = gradients
@@ -87,8 +87,8 @@ class ConvexInverse:
         points, gradients, hessians = self.starts(units)
         initial = np.ones(units.shape[1]), gradients, hessians
         smooth = np.arange(units.shape[1])
-        if self._corners is not None:
-            distance, near = self._corners.nearest(units)
+        if self.corners is not None:
+            distance, near = self.corners.nearest(units)
             in_cone = distance <= 1.0
             points[:, in_cone] = near[:, in_cone]
             smooth = np.flatnonzero(~in_cone)
@@ -113,9 +113,13 @@ class ConvexInverse:
 
     def starts_of_one(self, normal: Floats) -> Floats:
         """Return the start for one vector (3,), none where a corner might be the answer."""
-        if self._corners is not None:
+        if self.corners is not None:
             return np.empty((0, 3))
-        return self._starts[:, np.argmax(normal @ self._starts)][np.newaxis]
+        return self.start_of_one(normal)[np.newaxis]
+
+    def start_of_one(self, normal: Floats) -> Floats:
+        """Return the start (3,) with the most power of the table for one vector (3,)."""
+        return np.asarray(self._starts[:, np.argmax(normal @ self._starts)])
 
 
 class PeakInverse:

@@ -64,6 +64,18 @@ def gauge_of_one(terms: Sequence[Term], load: Vector) -> float | None:
     return None if t is None else exp(-t)
 
 
+def norm_of_one(terms: Sequence[Term], load: Vector) -> float:
+    """Return the sum of the terms' norms |R_i f|, whatever their exponents."""
+    x, y, z = load
+    total = 0.0
+    for _, _, a, b, c, d, e, f, g, h, i in terms:
+        u = a * x + b * y + c * z
+        v = d * x + e * y + f * z
+        w = g * x + h * y + i * z
+        total += sqrt(u * u + v * v + w * w)
+    return total
+
+
 def norm_gradient_of_one(terms: Sequence[Term], load: Vector) -> Vector | None:
     """Return the gradient of the sum of the terms' norms |R_i f|, whatever their exponents."""
     x, y, z = load

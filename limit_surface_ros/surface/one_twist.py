@@ -21,6 +21,8 @@ _STEPS = 30
 _SMALL = 1e-9
 _LAST_STEP = 1e-8
 _TARGET = 1e-14
+# A larger sine before a last step may come from a kink that drew Newton's method in.
+_PARALLEL = 1e-6
 
 
 def most_power_of_one(
@@ -73,6 +75,8 @@ def _climb(terms: Sequence[Term], twist: Vector, start: Vector) -> Vector | None
         previous = -t
         sine = hypot(*gradient) / abs(1.0 - p * gradient[0] - q * gradient[1])
         step = hypot(*move) / sqrt(1.0 + p * p + q * q)
+        if step <= _LAST_STEP and sine > _PARALLEL:
+            return None
         if sine > _TARGET:
             p += move[0]
             q += move[1]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from limit_surface_ros.errors import NotFiniteError, ShapeError, ZeroVectorError
+from limit_surface_ros.surface import sampling
 from limit_surface_ros.surface.dissipation import Dissipation
 from limit_surface_ros.surface.point_contacts import PointContacts
 from limit_surface_ros.surface.polynomial import Polynomial
@@ -89,3 +90,28 @@ def test_the_lean_path_finds_the_same_most_power_on_any_power_sum(seed):
     np.testing.assert_allclose(
         (loads * twists).sum(axis=1), (many * twists).sum(axis=1), rtol=1e-12
     )
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_lean_path_finds_the_same_motion_for_any_sum_of_norms(seed):
+    rng = np.random.default_rng(seed)
+    roots = rng.standard_normal((1 + seed % 5, 1 + seed % 3, 3))
+    points = 0.1 * rng.standard_normal((2 + seed % 4, 2))
+    contacts = PointContacts(points, rng.uniform(0.1, 1.0, len(points)), SCALING)
+    facets = sampling.facet_loads(contacts, 3, rng).wrenches
+    sum_of_norms = Dissipation(np.swapaxes(roots, 1, 2) @ roots, SCALING)
+    for surface, some in (
+        (contacts, facets),
+        (contacts.dissipation(), facets),
+        (sum_of_norms, []),
+    ):
+        any_loads = rng.standard_normal((20, 3)) * SCALING.wrench_unit
+        loads = [*any_loads, *sampling.random_motions(surface, 12, rng).wrenches, *some]
+        factors = np.array([surface.load_factor(load) for load in loads])
+        np.testing.assert_allclose(factors, surface.load_factor(loads), rtol=1e-11)
+        limited = np.isfinite(factors)
+        loads, factors = np.array(loads)[limited], factors[limited]
+        twists = np.array([surface.twist_of_wrench(load) for load in loads])
+        power = (loads * twists).sum(axis=1) / factors
+        most = (surface.wrench_of_twist(twists) * twists).sum(axis=1)
+        np.testing.assert_allclose(power, most, rtol=1e-11)
