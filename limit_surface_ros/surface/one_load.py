@@ -129,7 +129,7 @@ def normal_of_one(terms: Sequence[Term], load: Vector) -> Vector | None:
 
 def log_scale_of_one(terms: Sequence[Term], forms: list[float]) -> float | None:
     """Return t with sum_i exp(p_i (log q_i + 2 t)) = 1; see `power_sum_scale.log_scales`."""
-    t = -0.5 * log(max(forms))
+    t = -log(sum(map(sqrt, forms)))
     slopes = [(2.0 * term[0], term[0] * log(q)) for term, q in zip(terms, forms, strict=True)]
     for _ in range(_STEPS):
         value = rise = 0.0

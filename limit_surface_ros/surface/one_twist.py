@@ -65,21 +65,26 @@ def _climb(terms: Sequence[Term], twist: Vector, start: Vector) -> Vector | None
     # In the plane a form is q0 + 2 (b1 p + b2 q) + a11 p^2 + 2 a12 p q + a22 q^2.
     forms = [_in_plane(term, (nx, ny, nz), first, second) for term in terms]
     previous = float("inf")
+    step_p = step_q = 0.0
     for _ in range(_STEPS):
         found = _newton(terms, forms, p, q)
         if found is None:
             return None
         t, gradient, move = found
         if -t > previous + 1e-15:
-            return None
+            step_p, step_q = 0.5 * step_p, 0.5 * step_q
+            p -= step_p
+            q -= step_q
+            continue
         previous = -t
+        step_p, step_q = move
         sine = hypot(*gradient) / abs(1.0 - p * gradient[0] - q * gradient[1])
         step = hypot(*move) / sqrt(1.0 + p * p + q * q)
         if step <= _LAST_STEP and sine > _PARALLEL:
             return None
         if sine > _TARGET:
-            p += move[0]
-            q += move[1]
+            p += step_p
+            q += step_q
         if sine <= _TARGET or step <= _LAST_STEP:
             load = (
                 nx + p * first[0] + q * second[0],
