@@ -127,10 +127,10 @@ class ManyPointsInverse:
         least = _CLEAR * self._reach
         for motions, part, speed in self._blocks(twists.shape[1], np.float64):
             np.matmul(self._squares[part], weights[:, motions], out=speed)
-            fast = speed.min(axis=0) > least
-            if not fast.all():
+            # The least of all is cheaper than the least of each motion.
+            if speed.min() <= least:
+                clear[motions] &= speed.min(axis=0) > least
                 np.maximum(speed, least, out=speed)
-                clear[motions] &= fast
             np.sqrt(speed, out=speed)
             sums[:, motions] += self._pulls[:, part] @ np.divide(1.0, speed, out=speed)
         return _gradient(twists, sums), clear
