@@ -118,14 +118,21 @@ def check_support(pairs: ScaledPairs, parameters: int) -> None:
         parameters: How many numbers the fit is to find; 0 leaves the count unchecked.
 
     Raises:
-        DataError: There are fewer pairs than parameters, all motions are one, or a direction of
-            load was never tried.
+        DataError: There are fewer pairs than parameters, most have negative power, all motions
+            are one, or a direction of load was never tried.
     """
     count = len(pairs)
     if count < max(parameters, 1):
         raise DataError(
             f"{count} pairs cannot determine {parameters} parameters: give more pairs, fewer "
             "terms, or a fit that is held by a prior"
+        )
+    against = int(np.count_nonzero(np.sum(pairs.wrenches * pairs.directions, axis=1) < 0.0))
+    if against > count / 2:
+        raise DataError(
+            f"{against} of {count} pushes have negative power: a body that slides with "
+            "friction only takes power in; are the wrenches those on the pusher, or the twists "
+            "reversed?"
         )
     moments = np.linalg.eigvalsh(pairs.directions.T @ pairs.directions / count)
     if moments[-1] > _ONE_DIRECTION:

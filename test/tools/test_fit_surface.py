@@ -32,6 +32,12 @@ def pushes(tmp_path):
     return path
 
 
+def with_reversed_load(row):
+    """Return a row of a CSV with the wrench that the body exerts on the pusher."""
+    cells = row.split(",")
+    return ",".join([*(repr(-float(cell)) for cell in cells[:3]), *cells[3:]])
+
+
 def test_a_model_is_fitted_and_written_with_its_history(pushes, tmp_path, capsys):
     output = tmp_path / "model.yaml"
     arguments = [str(pushes), "-o", str(output), "--terms", "2", "--rows", "0-39", "--starts", "4"]
@@ -56,6 +62,10 @@ def test_a_model_is_fitted_and_written_with_its_history(pushes, tmp_path, capsys
         (lambda lines: [*lines, "nan,1,1,1,1,1"], "line 62: column fx_N: must be finite"),
         (lambda lines: lines[:10], "9 pairs cannot determine 18 parameters"),
         (lambda lines: [lines[0], *([lines[1]] * 60)], "all motions go in one direction"),
+        (
+            lambda lines: [lines[0], *map(with_reversed_load, lines[1:])],
+            "60 of 60 pushes have negative power",
+        ),
     ],
 )
 def test_bad_data_give_one_line_and_no_file(pushes, tmp_path, capsys, change, message):
