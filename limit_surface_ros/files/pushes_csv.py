@@ -9,7 +9,6 @@ matters; other columns are ignored.
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from dataclasses import dataclass, field
@@ -19,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from limit_surface_ros.errors import DataError, FileError
+from limit_surface_ros.files.csv_row import cells_of
 from limit_surface_ros.surface.pairs import Pairs
 
 if TYPE_CHECKING:
@@ -144,7 +144,7 @@ def _about(path: Path, first: tuple[int, str]) -> dict[str, Any]:
 
 
 def _columns(path: Path, number: int, line: str) -> list[str]:
-    names = [name.strip() for name in next(csv.reader([line]))]
+    names = cells_of(path, number, line)
     for name in COLUMNS:
         if names.count(name) != 1:
             found = "is missing" if name not in names else "is given twice"
@@ -158,12 +158,12 @@ def _columns(path: Path, number: int, line: str) -> list[str]:
 def _row(path: Path, number: int, line: str, columns: list[str]) -> list[float]:
     """Return the six numbers of a row in the order of COLUMNS."""
     place = f"{path}: line {number}"
-    cells = next(csv.reader([line]))
+    cells = cells_of(path, number, line)
     if len(cells) != len(columns):
         raise FileError(f"{place}: has {len(cells)} cells, the columns are {len(columns)}")
     values = []
     for name in COLUMNS:
-        cell = cells[columns.index(name)].strip()
+        cell = cells[columns.index(name)]
         try:
             value = float(cell)
         except ValueError:

@@ -6,7 +6,6 @@ value. Blank lines and lines that begin with `#` are skipped. Times are counted 
 
 from __future__ import annotations
 
-import csv
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +14,7 @@ import numpy as np
 
 from limit_surface_ros.decay.targets import PiecewiseLinear
 from limit_surface_ros.errors import DataError, FileError
+from limit_surface_ros.files.csv_row import cells_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,7 +43,7 @@ def read_response(
     except UnicodeDecodeError as error:
         raise FileError(f"{path}: is not UTF-8 text: {error}") from None
     rows = [
-        (number, [cell.strip() for cell in next(csv.reader([line]))])
+        (number, cells_of(path, number, line))
         for number, line in enumerate(lines, start=1)
         if line.strip() and not line.lstrip().startswith("#")
     ]

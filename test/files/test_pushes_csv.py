@@ -68,6 +68,7 @@ def test_rows_are_selected_and_the_rest_held_out(tmp_path):
         (NAMES + "1,2,3\n", "line 2: has 3 cells, the columns are 6"),
         (NAMES + "0,0,0,1,1,1\n", "line 2: the wrench is zero"),
         (NAMES + "1,1,1,0,0,0\n", "line 2: the twist is zero"),
+        (NAMES + ROW + "1" * 200_000 + "\n", "line 3: is not a row of CSV: field larger"),
         ("# {broken\n" + NAMES + ROW, "line 1: is not a JSON object"),
     ],
 )

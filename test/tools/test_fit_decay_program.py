@@ -80,6 +80,7 @@ def test_a_column_is_chosen_by_its_name(tmp_path):
         ("t,x\n0,1\n1,0.5\n", ["--end", "5"], "ends at 1 s"),
         ("t,x\n0,1\n1,0.5\n", ["--end", "-5"], "--end"),
         ("t\n0\n1\n", [], "has no column 2"),
+        ("t,x\n0,1\n1," + "1" * 200_000, [], "line 3: is not a row of CSV: field larger"),
     ],
 )
 def test_a_bad_record_gives_one_line_and_no_file(tmp_path, capsys, text, extra, message):
