@@ -83,7 +83,13 @@ def add_ros_wheels(env: dict[str, str], venv: Path) -> None:
 
 
 def add_package(env: dict[str, str], prefix: Path) -> None:
-    """Change `env` to what the local_setup script of the package in `prefix` would make of it."""
+    """Change `env` to what the local_setup script of the package in `prefix` would make of it.
+
+    Its programs are put on the PATH besides, for who has no `ros2 run`.
+    """
+    programs = prefix / "lib" / prefix.name
+    if programs.is_dir():
+        _prepend(env, "PATH", programs)
     _prepend(env, "AMENT_PREFIX_PATH", prefix)
     _prepend(env, "CMAKE_PREFIX_PATH", prefix)
     if list((prefix / "lib").glob("*.so")):

@@ -85,7 +85,7 @@ def build(root: Path, python: Path, env: Mapping[str, str]) -> None:
 
 
 def add_workspace(root: Path, env: dict[str, str]) -> None:
-    """Change `env` to what the workspace's install/local_setup script would make of it."""
+    """Let programs in `env` find the packages of the workspace, and a shell their programs."""
     for package in PACKAGES:
         add_package(env, root / "install" / package.name)
 

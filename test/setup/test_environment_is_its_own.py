@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -32,6 +33,21 @@ def test_a_sourced_ros_stays(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
     env = base_environment(tmp_path, system_ros=True)
     assert env["PYTHONPATH"] == "/opt/ros/jazzy/lib"
     assert env["AMENT_PREFIX_PATH"] == "/opt/ros/jazzy"
+
+
+def test_programs_run_by_their_names(tmp_path: Path) -> None:
+    from environment import add_package
+
+    prefix = tmp_path / "a_package"
+    program = prefix / "lib" / "a_package" / "a_program"
+    program.parent.mkdir(parents=True)
+    program.write_text("#!/bin/sh\n")
+    program.chmod(0o755)
+    env = {"PATH": "/usr/bin"}
+    add_package(env, prefix)
+    add_package(env, tmp_path / "package_without_programs")
+    assert env["PATH"] == f"{program.parent}{os.pathsep}/usr/bin"
+    assert shutil.which("a_program", path=env["PATH"]) == str(program)
 
 
 @pytest.mark.parametrize("home", ["", "/proc/nowhere"])
