@@ -95,17 +95,25 @@ def model_paths(entries: Iterable[str | Path]) -> list[Path]:
     for entry in entries:
         if not str(entry):
             raise FileError("an entry of the model files is empty")
-        path = Path(entry).expanduser()
-        if path.is_dir():
-            inside = sorted(path.glob("*.yaml"))
-            if not inside:
-                raise FileError(f"{path}: the folder holds no *.yaml file")
-            paths += inside
-        elif path.exists():
-            paths.append(path)
-        else:
-            raise FileError(f"{path}: no such file or folder")
+        try:
+            paths += _paths_of(Path(entry).expanduser())
+        except FileError:
+            raise
+        except (OSError, RuntimeError, ValueError) as error:
+            # No permission, a name too long, no home folder, a NUL character.
+            raise FileError(f"{entry}: cannot be read: {error}") from None
     return paths
+
+
+def _paths_of(path: Path) -> list[Path]:
+    if path.is_dir():
+        inside = sorted(path.glob("*.yaml"))
+        if not inside:
+            raise FileError(f"{path}: the folder holds no *.yaml file")
+        return inside
+    if not path.exists():
+        raise FileError(f"{path}: no such file or folder")
+    return [path]
 
 
 def read_model_set(

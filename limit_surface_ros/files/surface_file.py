@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from limit_surface_ros.surface.protocol import LimitSurface
 
 SCHEMA = 1
+# Scales [m], [N] beyond this and its reciprocal would take answers out of the range of numbers.
+_LARGEST_SCALE = 1e12
 
 
 @dataclass(frozen=True)
@@ -113,10 +115,14 @@ def read_surface_model(path: str | Path) -> SurfaceModel:
     """
     section = read_yaml(path)
     section.choice("schema", [SCHEMA])
+    if "kind" not in section and ("points" in section or "shape" in section):
+        raise section.error("kind", "missing; this is a contact file: fit_surface fits it")
     kind = section.choice("kind", list(_READERS))
     scaling = Scaling(
-        section.number("characteristic_length", above=0.0),
-        section.number("friction_force", above=0.0),
+        *(
+            section.number(key, at_least=1.0 / _LARGEST_SCALE, at_most=_LARGEST_SCALE)
+            for key in ("characteristic_length", "friction_force")
+        )
     )
     reference_point = section.array("reference_point", (2,), (0.0, 0.0))
     history = section.section("fit", {})

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import os
+import stat
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping
 
     from limit_surface_ros.checks import Floats
+
+# No model is larger: a matrix takes some 200 bytes.
+MAX_BYTES = 16 * 2**20
+MAX_DEPTH = 100
+# Characters up to which a text cannot be nested deep enough to do harm.
+SHALLOW_LENGTH = 10_000
 
 _REQUIRED: Any = object()
 # libyaml reads about ten times as fast and is there on every common platform.
@@ -219,6 +226,32 @@ class Section:
         return number
 
 
+def _text_of(path: Path) -> str:
+    """Return the text of a model file, once it is clear that it can be one."""
+    status = path.stat()
+    if stat.S_ISDIR(status.st_mode):
+        raise FileError(f"{path}: cannot be read: Is a directory")
+    if not stat.S_ISREG(status.st_mode):
+        raise FileError(f"{path}: cannot be read: it is no regular file")
+    if status.st_size > MAX_BYTES:
+        raise FileError(
+            f"{path}: has {status.st_size} bytes; at most {MAX_BYTES} are read as a model"
+        )
+    return path.read_text(encoding="utf-8")
+
+
+def _check_depth(path: Path, text: str) -> None:
+    """Refuse what is nested so deep that building it would overflow the C stack of libyaml."""
+    depth = 0
+    for event in yaml.parse(text, Loader=_SafeLoader):
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+            if depth > MAX_DEPTH:
+                raise FileError(f"{path}: is nested deeper than {MAX_DEPTH} levels")
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+
+
 def read_yaml(path: str | Path) -> Section:
     """Read a YAML file whose top level is a mapping.
 
@@ -227,19 +260,21 @@ def read_yaml(path: str | Path) -> Section:
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = _text_of(path)
     except OSError as error:
         raise FileError(f"{path}: cannot be read: {error.strerror or error}") from None
     except UnicodeDecodeError as error:
         raise FileError(f"{path}: is not UTF-8 text: {error}") from None
     try:
+        if len(text) > SHALLOW_LENGTH:
+            _check_depth(path, text)
         # _Loader is a safe loader: it builds plain Python values only.
         values = yaml.load(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
         raise FileError(f"{path}: {where}{error.problem or error}") from None
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
+    except (yaml.YAMLError, ValueError) as error:
         raise FileError(f"{path}: is not YAML: {error}") from None
     if not isinstance(values, dict):
         kind = "is empty" if values is None else f"holds {type(values).__name__} at its top level"
@@ -265,13 +300,17 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
         content: Text, which is written as UTF-8, or bytes.
 
     Raises:
-        FileError: The folder is absent or not writable, or the disk is full.
+        FileError: The folder is absent or not writable, the disk is full, or something that is no
+            regular file stands at the path.
     """
-    path = Path(path)
     part: Path | None = None
     try:
+        # Where a link points, not the link, is what gets new content.
+        target = Path(path).resolve()
+        if target.exists() and not target.is_file():
+            raise FileError(f"{path}: cannot be written: it is no regular file")
         with tempfile.NamedTemporaryFile(
-            "wb", dir=path.parent, prefix=f".{path.name}.", delete=False
+            "wb", dir=target.parent, prefix=f".{target.name}.", delete=False
         ) as stream:
             part = Path(stream.name)
             stream.write(content.encode() if isinstance(content, str) else content)
@@ -281,7 +320,7 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
         umask = os.umask(0)
         os.umask(umask)
         part.chmod(0o666 & ~umask)
-        part.replace(path)
+        part.replace(target)
     except OSError as error:
         raise FileError(f"{path}: cannot be written: {error.strerror or error}") from None
     finally:

@@ -67,8 +67,8 @@ def run(make_nodes: Callable[[], Sequence[Node]], description: str, argv: Sequen
         "--ros-args -p NAME:=VALUE --params-file FILE -r FROM:=TO -r __ns:=/NAMESPACE",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.parse_args(remove_ros_args(list(argv))[1:])
     try:
+        parser.parse_args(remove_ros_args(list(argv))[1:])
         rclpy.init(args=list(argv), signal_handler_options=SignalHandlerOptions.NO)
         nodes = make_nodes()
     except _CONFIGURATION_ERRORS as error:

@@ -66,6 +66,8 @@ def test_one_bad_file_or_entry_refuses_the_whole_set(tmp_path):
         ([good, tmp_path / "absent.yaml"], "absent.yaml: no such file or folder"),
         ([good, tmp_path / "empty"], "the folder holds no"),
         ([good, ""], "an entry of the model files is empty"),
+        ([good, "x" * 300], "cannot be read: .*File name too long"),
+        ([good, "nul\0.yaml"], "cannot be read|no such file"),
     ):
         with pytest.raises(FileError, match=message):
             read_model_set(entries, read)

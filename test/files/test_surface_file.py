@@ -71,7 +71,7 @@ def test_a_file_cut_short_anywhere_is_refused(tmp_path, surface):
         ("name: part", "", "name: missing"),
         ("name: part", "name: 7", "name: must be a text that is not empty, got 7"),
         ("frame_id: object", "frame_id: ''", "frame_id: must be a text"),
-        ("friction_force: 1.0", "friction_force: -1.0", "friction_force: must be above 0.0"),
+        ("friction_force: 1.0", "friction_force: -1.0", "friction_force: must be at least 1e-12"),
         (
             "friction_force: 1.0",
             "friction_force: 1e3",

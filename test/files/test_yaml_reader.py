@@ -85,6 +85,35 @@ def test_a_file_that_cannot_be_read_is_refused_with_its_name(tmp_path):
         read_yaml(tmp_path / "latin.yaml")
 
 
+def test_a_text_nested_too_deep_for_the_stack_is_refused(section_of):
+    for text in ("[" * 40_000, "- " * 40_000, "a: " + "{b: " * 40_000):
+        with pytest.raises(FileError, match="is nested deeper than 100 levels"):
+            section_of(text)
+
+
+def test_what_is_no_regular_file_or_too_large_is_neither_read_nor_replaced(tmp_path):
+    fifo = tmp_path / "fifo.yaml"
+    os.mkfifo(fifo)
+    for path in (fifo, "/dev/zero"):
+        with pytest.raises(FileError, match="it is no regular file"):
+            read_yaml(path)
+        with pytest.raises(FileError, match="it is no regular file"):
+            write_atomically(path, "text")
+    large = tmp_path / "large.yaml"
+    with large.open("wb") as stream:
+        stream.truncate(2**30)
+    with pytest.raises(FileError, match="has 1073741824 bytes; at most"):
+        read_yaml(large)
+
+
+def test_a_link_keeps_pointing_where_it_did(tmp_path):
+    (tmp_path / "model.yaml").write_text("old")
+    (tmp_path / "link.yaml").symlink_to(tmp_path / "model.yaml")
+    write_atomically(tmp_path / "link.yaml", "new")
+    assert (tmp_path / "link.yaml").is_symlink()
+    assert (tmp_path / "model.yaml").read_text() == "new"
+
+
 def test_an_unknown_key_is_refused_with_those_that_are_known(section_of):
     section = section_of("outer: {known: 1, knwon: 2}").section("outer")
     section.number("known")
