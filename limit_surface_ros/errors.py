@@ -114,13 +114,13 @@ class ClusterError(LimitSurfaceError, ConnectionError):
 
 
 class MissingExtraError(LimitSurfaceError, ImportError):
-    """An optional library is absent; the message names the extra that brings it."""
+    """An optional library is absent; the message tells how to install it and names its extra."""
 
     code = "INTERNAL"
 
     def __init__(self, library: str, extra: str) -> None:
-        """Name the missing `library` and the `extra` of this package that installs it."""
+        """Name the missing `library` and the `extra` of setup.py that it belongs to."""
         super().__init__(
-            f"{library} is needed here and is not installed: "
-            f"pip install 'limit_surface_ros[{extra}]' or pip install {library}"
+            f"{library} is needed here and is not installed: pip install {library} "
+            f"(it belongs to the optional extra '{extra}')"
         )
