@@ -29,6 +29,7 @@ from node_processes import (
     timed,
     wrench_message,
 )
+from rclpy.qos import QoSProfile
 
 from limit_surface_ros.nodes import convert
 from limit_surface_ros.nodes.service_client import ServiceClient
@@ -103,7 +104,12 @@ class Crowd:
         self._node = client.node
         self._request = WrenchToTwist.Request(wrench=wrench_message([2.0, 1.0, 0.05]))
         name = f"{prefix}/wrench_to_twist"
-        self._clients = [self._node.create_client(WrenchToTwist, name) for _ in range(count)]
+        # Every client of a service hears all of its answers: with the default depth of 10 those to
+        # others push its own out before it is taken.
+        deep = QoSProfile(depth=1000)
+        self._clients = [
+            self._node.create_client(WrenchToTwist, name, qos_profile=deep) for _ in range(count)
+        ]
         self._left = 0
         self._counting = threading.Lock()
         self._done = threading.Event()
