@@ -107,7 +107,7 @@ def choose_recipe(
 
     Raises:
         DataError: The pushes cannot determine a surface.
-        RangeError: There is no candidate or fewer than two folds.
+        RangeError: There are fewer than two folds, or more of them than pushes.
     """
     count = len(pairs)
     recipes = list(candidates or default_candidates(count, support is not None))
@@ -115,8 +115,10 @@ def choose_recipe(
         raise RangeError(f"folds must be at least 2, got {folds}")
     scaled = scale_pairs(pairs, scaling)
     check_support(scaled, FEWEST_PAIRS + 2)
+    if folds > count:
+        raise RangeError(f"folds must be at most one for each of the {count} pushes, got {folds}")
     scaling = scaled.scaling
-    parts = np.array_split(np.random.default_rng(seed).permutation(count), min(folds, count))
+    parts = np.array_split(np.random.default_rng(seed).permutation(count), folds)
     angles = np.full((len(recipes), count), np.inf)
     for row, recipe in enumerate(recipes):
         compared = replace(recipe, members=min(recipe.members, _MEMBERS_COMPARED))

@@ -143,9 +143,10 @@ def descents(objective: Objective, search: Search) -> list[Descent]:
 
 @contextmanager
 def process_pool(workers: int) -> Iterator[Executor | None]:
-    """Give an executor of `workers` processes, or None for one: then work runs here.
+    """Give an executor of `workers` processes (see `worker_processes`), or None for one.
 
-    Interrupted, it leaves no process behind and the workers print nothing.
+    With None, work runs here, one start after the other. Interrupted, the executor leaves no
+    process behind and its processes print nothing.
 
     Raises:
         RangeError: `workers` is below 1.

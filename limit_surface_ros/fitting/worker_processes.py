@@ -16,10 +16,20 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from concurrent.futures import Executor
 
+# Processes for each core from which on more of them only cost memory, and time to begin.
+_MOST_PER_CORE = 4
+
+
+def available_cores() -> int:
+    """Return the number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
 
 @contextmanager
 def worker_processes(workers: int) -> Iterator[Executor]:
-    """Give an executor of `workers` processes.
+    """Give an executor of `workers` processes, but of no more than four for each core.
 
     On an error or an interrupt the processes are ended, whatever they are doing, and print
     nothing.
@@ -33,7 +43,8 @@ def worker_processes(workers: int) -> Iterator[Executor]:
     alone = threading.active_count() == 1 and "fork" in multiprocessing.get_all_start_methods()
     context = multiprocessing.get_context("fork" if alone else "spawn")
     others = set(multiprocessing.active_children())
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin)
+    size = min(workers, _MOST_PER_CORE * available_cores())
+    pool = ProcessPoolExecutor(size, mp_context=context, initializer=_begin)
     try:
         yield pool
     except BaseException:

@@ -20,10 +20,11 @@ from limit_surface_ros.errors import LimitSurfaceError, RangeError
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.fitting.multi_start import Search, process_pool
 from limit_surface_ros.fitting.result import errors_on
+from limit_surface_ros.fitting.worker_processes import available_cores
 from limit_surface_ros.surface.measures import velocity_error
 from limit_surface_ros.tools.program import run_program
 from limit_surface_ros.tools.progress import progress_bar
-from limit_surface_ros.tools.surface_fit import add_fit_options, available_cores, fit, read_input
+from limit_surface_ros.tools.surface_fit import add_fit_options, fit, read_input
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -23,12 +23,12 @@ from typing import TYPE_CHECKING
 from limit_surface_ros.errors import FileError, LimitSurfaceError
 from limit_surface_ros.files.surface_file import read_surface_model, write_surface_model
 from limit_surface_ros.fitting.catalogue import Outcome, outcomes
-from limit_surface_ros.fitting.worker_processes import worker_processes
+from limit_surface_ros.fitting.worker_processes import available_cores, worker_processes
 from limit_surface_ros.surface.convexity import NotConvexWarning
 from limit_surface_ros.tools.executors import CLUSTER_IN_FLIGHT, dask_executor
 from limit_surface_ros.tools.program import FAILED, run_program
 from limit_surface_ros.tools.progress import progress_bar
-from limit_surface_ros.tools.surface_fit import add_fit_options, available_cores, fit_model
+from limit_surface_ros.tools.surface_fit import add_fit_options, fit_model
 from limit_surface_ros.tools.training_data import ACCEPTED, SUFFIXES, is_bag
 
 if TYPE_CHECKING:

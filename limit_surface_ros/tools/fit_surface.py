@@ -12,9 +12,10 @@ import numpy as np
 
 from limit_surface_ros.files.surface_file import write_surface_model
 from limit_surface_ros.fitting.multi_start import process_pool
+from limit_surface_ros.fitting.worker_processes import available_cores
 from limit_surface_ros.tools.program import run_program
 from limit_surface_ros.tools.progress import progress_bar
-from limit_surface_ros.tools.surface_fit import add_fit_options, available_cores, fit_model
+from limit_surface_ros.tools.surface_fit import add_fit_options, fit_model
 from limit_surface_ros.tools.training_data import ACCEPTED
 
 if TYPE_CHECKING:

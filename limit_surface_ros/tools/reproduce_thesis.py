@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from limit_surface_ros.errors import FileError, RangeError
 from limit_surface_ros.fitting.multi_start import process_pool
+from limit_surface_ros.fitting.worker_processes import available_cores
 from limit_surface_ros.plots.canvas import new_figure
 from limit_surface_ros.plots.thesis.run import carry_out
 from limit_surface_ros.plots.thesis.settings import FULL, QUICK
@@ -16,7 +17,6 @@ from limit_surface_ros.plots.thesis.store import Store
 from limit_surface_ros.plots.thesis.studies import STUDIES
 from limit_surface_ros.tools.program import run_program
 from limit_surface_ros.tools.progress import progress_bar
-from limit_surface_ros.tools.surface_fit import available_cores
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import os
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -107,7 +106,12 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
         help="choose kind, terms, weight and what the fit is held towards by cross-validation, "
         "and average several fits; leaves the options above aside",
     )
-    few.add_argument("--folds", type=int, default=5, help="of the cross-validation (%(default)s)")
+    few.add_argument(
+        "--folds",
+        type=int,
+        default=5,
+        help="of the cross-validation; at most one for each push (%(default)s)",
+    )
     few.add_argument(
         "--support",
         action="store_true",
@@ -177,13 +181,6 @@ def _add_bag_options(bags: argparse._ArgumentGroup) -> None:
             metavar="X",
             help=f"{told} [{unit}] (%(default)s)",
         )
-
-
-def available_cores() -> int:
-    """Return the number of cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def fit_model(

@@ -1,6 +1,7 @@
 """Jobs of a catalogue: a bad one fails alone, whatever it does, and every other one is done."""
 
 import functools
+import multiprocessing
 import signal
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -9,7 +10,7 @@ import pytest
 
 from limit_surface_ros.errors import ClusterError, RangeError
 from limit_surface_ros.fitting.catalogue import outcomes
-from limit_surface_ros.fitting.worker_processes import worker_processes
+from limit_surface_ros.fitting.worker_processes import available_cores, worker_processes
 
 # An error that does not survive the way between processes.
 MISSING = "from limit_surface_ros.errors import *; raise MissingExtraError(\\'sage\\', \\'none\\')"
@@ -76,3 +77,9 @@ def test_jobs_that_a_cluster_drops_are_an_error_and_not_a_loss():
 def test_fewer_than_one_worker_is_refused():
     with pytest.raises(RangeError, match="workers must be at least 1, got 0"):
         list(outcomes(range(3), abs, functools.partial(worker_processes, 0), 2))
+
+
+def test_an_absurd_number_of_workers_does_not_fill_the_machine():
+    with worker_processes(100_000) as executor:
+        assert executor.submit(abs, -3).result() == 3
+        assert len(multiprocessing.active_children()) <= 4 * available_cores()

@@ -138,5 +138,7 @@ def test_what_cannot_be_chosen_is_refused():
         choose_recipe(Pairs(pushes.wrenches[:5], pushes.twists[:5]))
     with pytest.raises(RangeError, match="folds"):
         choose_recipe(pushes, folds=1)
+    with pytest.raises(RangeError, match=f"at most one for each of the {len(pushes)} pushes"):
+        choose_recipe(pushes, folds=1000)
     with pytest.raises(RangeError, match="only dissipation"):
         Recipe("power_sum", towards="support")
