@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import TYPE_CHECKING
 
@@ -32,15 +33,32 @@ def run_program(
 
     Returns:
         0, or what `run` returns; 2 with one line on standard error when the input is at fault;
-        130 when interrupted.
+        1 when nobody reads on, without a word, or the system refuses something; 130 when
+        interrupted.
     """
     arguments = parser.parse_args(argv)
     try:
         code = run(arguments)
+        sys.stdout.flush()
     except LimitSurfaceError as error:
         print(f"{parser.prog}: error: {error}", file=sys.stderr)
         return USAGE_ERROR
     except KeyboardInterrupt:
         print(f"{parser.prog}: {interrupted}", file=sys.stderr)
         return INTERRUPTED
+    except BrokenPipeError:
+        _give_up_unwritten_output()
+        return FAILED
+    except OSError as error:
+        _give_up_unwritten_output()
+        print(f"{parser.prog}: error: {error}", file=sys.stderr)
+        return FAILED
     return code or 0
+
+
+def _give_up_unwritten_output() -> None:
+    """Let the interpreter end without trying, and failing, once more to write what is left."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
