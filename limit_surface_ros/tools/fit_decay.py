@@ -18,12 +18,15 @@ import numpy as np
 
 from limit_surface_ros import __version__
 from limit_surface_ros.decay.coefficient_fits import NORMS
+from limit_surface_ros.decay.examples import EXAMPLES as RESPONSES
 from limit_surface_ros.decay.fit import METHODS, Options, fit_decay
 from limit_surface_ros.decay.response_fits import largest_error
 from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.decay_file import DecayModel, write_decay_model
 from limit_surface_ros.tools.decay_input import add_input_options, read_input
+from limit_surface_ros.tools.given_options import model_name, refuse_unused
 from limit_surface_ros.tools.program import run_program
+from limit_surface_ros.tools.training_data import is_bag
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -166,10 +169,32 @@ def history(result: DecayFit, given: DecayInput) -> dict[str, Any]:
     return values
 
 
+def refuse_options_of_others(options: argparse.Namespace) -> None:
+    """Refuse what is for another input or method than the one asked for.
+
+    Raises:
+        RangeError: An option would do nothing.
+    """
+    top = parser()
+    if options.input in RESPONSES:
+        refuse_unused(top, options, ["start"], "for a record")
+    if not is_bag(Path(options.input)):
+        refuse_unused(top, options, ["topic", "field"], "for a bag")
+    if options.input in RESPONSES or is_bag(Path(options.input)):
+        refuse_unused(top, options, ["time_column", "value_column"], "for a CSV file")
+    if options.method != "dde":
+        refuse_unused(top, options, ["max_delay", "degree", "allow_unstable"], "for --method dde")
+    if options.method not in ("neutral", "best"):
+        refuse_unused(top, options, ["tail_rate"], "for --method neutral or best")
+
+
 def run(options: argparse.Namespace) -> None:
     """Read, fit, write, report."""
-    if options.output is not None and not options.output.parent.is_dir():
-        raise RangeError(f"{options.output}: its folder does not exist")
+    if options.output is not None:
+        name = model_name(options.output, options.name)
+        if not options.output.parent.is_dir():
+            raise RangeError(f"{options.output}: its folder does not exist")
+    refuse_options_of_others(options)
     given = read_input(options)
     result = fit_decay(
         given.target,
@@ -185,7 +210,7 @@ def run(options: argparse.Namespace) -> None:
     if options.output is None:
         return
     model = DecayModel(
-        name=options.name or options.output.stem,
+        name=name,
         sum=result.fit.sum,
         time_span=(0.0, given.end),
         norm=result.fit.norm,

@@ -5,18 +5,21 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limit_surface_ros.files.bag_pushes import Selection
 from limit_surface_ros.files.surface_file import write_surface_model
 from limit_surface_ros.fitting.multi_start import process_pool
 from limit_surface_ros.fitting.worker_processes import available_cores
+from limit_surface_ros.tools.given_options import model_name, refuse_unused
 from limit_surface_ros.tools.program import run_program
 from limit_surface_ros.tools.progress import progress_bar
 from limit_surface_ros.tools.surface_fit import add_fit_options, fit_model
-from limit_surface_ros.tools.training_data import ACCEPTED
+from limit_surface_ros.tools.training_data import ACCEPTED, is_bag
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,6 +34,9 @@ EXAMPLES = """examples:
   fit_surface contact.yaml --kind dissipation --terms 4 --output model.yaml
   fit_surface pushes.mcap --wrench-topic wrench --motion-topic pose --auto --output model.yaml
 """
+
+OF_CONTACTS = ("motions", "facet_loads", "load_noise", "motion_noise")
+OF_BAGS = ("wrench_topic", "motion_topic", *asdict(Selection()))
 
 
 def parser() -> argparse.ArgumentParser:
@@ -82,9 +88,31 @@ def print_errors(label: str, errors: Errors) -> None:
     )
 
 
+def refuse_options_of_others(options: argparse.Namespace) -> None:
+    """Refuse what is for another kind of input or of fit than the one asked for.
+
+    Raises:
+        RangeError: An option would do nothing.
+    """
+    top, suffix = parser(), options.input.suffix.lower()
+    if suffix not in (".yaml", ".yml"):
+        refuse_unused(top, options, OF_CONTACTS, "for a contact file")
+    if suffix != ".csv":
+        refuse_unused(top, options, ["rows"], "for a CSV of pushes")
+    if not is_bag(options.input):
+        refuse_unused(top, options, OF_BAGS, "for a bag")
+    if not options.auto:
+        refuse_unused(top, options, ["folds", "support"], "for --auto")
+        if options.kind != "power_sum":
+            refuse_unused(top, options, ["family"], "for --kind power_sum")
+        if options.kind == "polynomial":
+            refuse_unused(top, options, ["terms"], "not for --kind polynomial")
+
+
 def run(options: argparse.Namespace) -> None:
     """Read, fit, write, report."""
-    name = options.name or options.output.stem
+    name = model_name(options.output, options.name)
+    refuse_options_of_others(options)
     with process_pool(options.workers) as executor, progress_bar("starts") as progress:
         fitted = fit_model(options.input, name, options, executor, progress)
     command = shlex.join(["fit_surface", *options.command])

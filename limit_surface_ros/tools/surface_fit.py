@@ -241,7 +241,9 @@ def read_input(path: Path, options: argparse.Namespace) -> TrainingData:
 
 def fit(options: argparse.Namespace, data: TrainingData, search: Search) -> FitResult:
     """Fit what the options ask for."""
-    length = options.characteristic_length or data.characteristic_length
+    length = options.characteristic_length
+    if length is None:
+        length = data.characteristic_length
     scaling = scaling_of_pairs(data.training, length)
     if options.auto:
         result = fit_automatically(

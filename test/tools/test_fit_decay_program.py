@@ -101,6 +101,11 @@ def test_a_bad_record_gives_one_line_and_no_file(tmp_path, capsys, text, extra, 
         (["f4", "-n", "5", "--method", "dde"], "not minimum-phase"),
         (["f1", "-n", "5", "-o", "no/such/folder/f.yaml"], "folder does not exist"),
         (["f1", "-n", "5", "--method", "dde", "--max-delay", "-1"], "max_delay"),
+        (["f1", "-n", "5", "--topic", "/wrench"], "--topic does nothing here: it is for a bag"),
+        (["f1", "-n", "5", "--value-column", "x"], "it is for a CSV file"),
+        (["f1", "-n", "5", "--max-delay", "3"], "it is for --method dde"),
+        (["f1", "-n", "5", "--name", "", "-o", "f.yaml"], "--name must not be empty"),
+        (["f1", "-n", "5", "-o", "f.txt"], "must end in .yaml or .yml"),
     ],
 )
 def test_a_bad_request_says_what_was_wrong(capsys, arguments, message):
@@ -203,4 +208,4 @@ def test_help_teaches_with_examples(program, capsys):
 def test_without_rosbags_the_extra_is_named(tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
     assert fit_decay.main([str(tmp_path), "--topic", "/x", "-n", "1"]) == 2
-    assert "limit_surface_ros[bags]" in capsys.readouterr().err
+    assert "extra 'bags'" in capsys.readouterr().err

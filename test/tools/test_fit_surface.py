@@ -126,6 +126,13 @@ def test_the_automatic_fit_stores_its_choice_and_its_bootstrap(pushes, tmp_path)
         ),
         (["--kind", "dissipation", "--objective", "J2"], "which takes forces, directions, both"),
         (["--bootstrap", "5"], "give both"),
+        (["--motions", "300"], "--motions does nothing here: it is for a contact file"),
+        (["--wrench-topic", "/w"], "--wrench-topic does nothing here: it is for a bag"),
+        (["--kind", "dissipation", "--family", "norms"], "it is for --kind power_sum"),
+        (["--folds", "3"], "it is for --auto"),
+        (["--characteristic-length", "0"], "must be"),
+        (["--name", ""], "--name must not be empty"),
+        (["--output", "model.txt"], "must end in .yaml or .yml"),
         (["--auto", "--support"], "states no support points"),
         (["--terms", "0"], "terms must be at least 1"),
         (["--starts", "0"], "starts must be at least 1"),
@@ -139,6 +146,13 @@ def test_options_that_do_not_fit_together_are_refused(pushes, tmp_path, capsys, 
     assert main([str(pushes), "-o", str(output), *options]) == 2
     assert message in capsys.readouterr().err
     assert not output.exists()
+
+
+def test_rows_of_a_contact_are_refused(tmp_path, capsys):
+    contact, output = tmp_path / "contact.yaml", tmp_path / "model.yaml"
+    contact.write_text(CONTACT)
+    assert main([str(contact), "-o", str(output), "--rows", "0-3"]) == 2
+    assert "--rows does nothing here: it is for a CSV of pushes" in capsys.readouterr().err
 
 
 def test_an_unknown_input_is_refused(tmp_path, capsys):
