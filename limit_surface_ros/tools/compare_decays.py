@@ -55,6 +55,7 @@ def compare(options: argparse.Namespace, given: DecayInput, method: str, terms: 
     Raises:
         LimitSurfaceError: The method cannot be used on this response.
     """
+    given.require_samples_for(terms)
     result = fit_decay(given.target, terms, given.end, method, options=method_options(options))
     x, after = result.fit.sum, beyond(result, given)
     return [

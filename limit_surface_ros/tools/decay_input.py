@@ -10,7 +10,7 @@ import numpy as np
 from limit_surface_ros.checks import as_positive
 from limit_surface_ros.decay.examples import EXAMPLES, example
 from limit_surface_ros.decay.targets import PiecewiseLinear
-from limit_surface_ros.errors import FileError
+from limit_surface_ros.errors import DataError, FileError
 from limit_surface_ros.files.bag_reader import read_topic
 from limit_surface_ros.files.response_csv import read_response
 
@@ -31,14 +31,30 @@ class DecayInput:
         target: The response.
         end: End of the fitted interval [s].
         horizon: Up to where errors beyond the interval are measured [s]; not below `end`.
+        samples: How many samples a record has on the interval; None for an example.
     """
 
-    def __init__(self, source: str, target: Target, end: float, horizon: float) -> None:
+    def __init__(
+        self, source: str, target: Target, end: float, horizon: float, samples: int | None = None
+    ) -> None:
         """Take what has been read."""
         self.source = source
         self.target = target
         self.end = end
         self.horizon = max(horizon, end)
+        self.samples = samples
+
+    def require_samples_for(self, terms: int) -> None:
+        """Refuse more terms than the samples can determine: each has a rate and a coefficient.
+
+        Raises:
+            DataError: The record has fewer samples than two for each term.
+        """
+        if self.samples is not None and self.samples < 2 * terms:
+            raise DataError(
+                f"{self.source}: {terms} terms need at least {2 * terms} samples on "
+                f"[0, {self.end:g}] s, there are {self.samples}"
+            )
 
 
 def add_input_options(parser: argparse.ArgumentParser) -> None:
@@ -136,4 +152,5 @@ def of_record(source: str, record: PiecewiseLinear, end: float | None) -> DecayI
     last = float(record.knots[-1])
     if end is not None and end > last:
         raise FileError(f"{source}: the record ends at {last:g} s, before --end {end:g}")
-    return DecayInput(source, record, end or last, last)
+    span = end or last
+    return DecayInput(source, record, span, last, int(np.count_nonzero(record.knots <= span)))

@@ -50,6 +50,9 @@ examples:
       --output relaxation.yaml
 """
 
+# Parts of the onset from which on a fit is doubted: what is left at the end, and the error.
+MOST_LEFT, LARGE_ERROR = 0.9, 0.5
+
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
@@ -119,6 +122,23 @@ def beyond(result: DecayFit, given: DecayInput) -> float | None:
     if given.horizon <= given.end:
         return None
     return largest_error(result.fit.sum, given.target, given.end, given.horizon)
+
+
+def doubts(result: DecayFit, given: DecayInput) -> list[str]:
+    """Return why the fit may be no model of a decaying response, in one line each."""
+    fit, found = result.fit, []
+    onset = abs(float(given.target(0.0)))
+    left = abs(float(fit.sum(given.end))) / abs(float(fit.sum(0.0)) or onset)
+    if left > MOST_LEFT:
+        found.append(
+            f"the fitted sum does not decay: at {given.end:g} s it is {left:.3g} times its onset"
+        )
+    if fit.max_error > LARGE_ERROR * onset:
+        found.append(
+            f"the error is {fit.max_error / onset:.3g} times the onset: "
+            "too few terms, or no decaying response"
+        )
+    return found
 
 
 def report(result: DecayFit, given: DecayInput) -> None:
@@ -196,6 +216,7 @@ def run(options: argparse.Namespace) -> None:
             raise RangeError(f"{options.output}: its folder does not exist")
     refuse_options_of_others(options)
     given = read_input(options)
+    given.require_samples_for(options.terms)
     result = fit_decay(
         given.target,
         options.terms,
@@ -207,6 +228,8 @@ def run(options: argparse.Namespace) -> None:
     )
     end_progress()
     report(result, given)
+    for doubt in doubts(result, given):
+        print(f"fit_decay: warning: {doubt}", file=sys.stderr)
     if options.output is None:
         return
     model = DecayModel(

@@ -93,6 +93,26 @@ def test_a_bad_record_gives_one_line_and_no_file(tmp_path, capsys, text, extra, 
     assert not output.exists()
 
 
+def test_more_terms_than_the_samples_determine_are_refused(tmp_path, capsys):
+    record = write_record(tmp_path / "record.csv")
+    assert fit_decay.main([str(record), "-n", "1000"]) == 2
+    assert "1000 terms need at least 2000 samples on [0, 6] s, there are 241" in (
+        capsys.readouterr().err
+    )
+    assert fit_decay.main([str(record), "-n", "21", "--end", "1"]) == 2
+    assert "there are 41" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("growth", "warned"), [(0.3, True), (0.0, True), (-0.05, False), (-2.0, False)]
+)
+def test_a_response_that_does_not_decay_is_warned_of(tmp_path, capsys, growth, warned):
+    record, times = tmp_path / "record.csv", np.linspace(0.0, 6.0, 61)
+    record.write_text("\n".join(f"{t},{np.exp(growth * t)}" for t in times))
+    assert fit_decay.main([str(record), "-n", "2"]) == 0
+    assert ("warning: the fitted sum does not decay" in capsys.readouterr().err) == warned
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
