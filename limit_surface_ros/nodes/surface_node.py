@@ -76,12 +76,11 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
         load = self._inputs.wrench(model, request.wrench)
         surface = load.surface
         self._markers.note(model, surface, load.vector)
-        factor = float(surface.load_factor(load.vector))
-        twist = surface.twist_of_wrench(load.vector)
+        twist, factor = surface.twist_and_load_factor(load.vector)
         convert.fill_twist(response.twist.twist, twist)
         convert.fill_wrench(response.limit_wrench.wrench, load.vector / factor)
-        response.load_factor = factor
-        response.slides = factor >= 1.0
+        response.load_factor = float(factor)
+        response.slides = bool(factor >= 1.0)
         for stamped in (response.twist, response.limit_wrench):
             _head(stamped.header, request.wrench.header, model)
 
@@ -100,8 +99,8 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
     ) -> None:
         surface = self._inputs.surface(self.models[request.model])
         wrenches = convert.rows_of("wrenches", request.wrenches)
-        response.twists = convert.flat_of(surface.twist_of_wrench(wrenches))
-        response.load_factors = convert.flat_of(surface.load_factor(wrenches))
+        twists, factors = surface.twist_and_load_factor(wrenches)
+        response.twists, response.load_factors = convert.flat_of(twists), convert.flat_of(factors)
 
     def _twists_to_wrenches(
         self, request: TwistsToWrenches.Request, response: TwistsToWrenches.Response

@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.checks import Floats, Places
 
 # Relative width of the rim that counts as part of a cone of normals.
 RIM = 1e-12
@@ -74,22 +72,36 @@ class Corners:
             points (3, m), not scaled: exact within the cone, of second order beyond.
         """
         which = self._nearest(normals)
-        power = (self.points[which].T * normals).sum(axis=0)
+        points = self.points.T.take(which, axis=1)
+        power = (points * normals).sum(axis=0)
         power[np.abs(power) < _NO_POWER] = _NO_POWER
-        q = np.einsum("mij,jm->im", self.inverses[which], normals) / power
-        q -= self.centres[which].T
-        distance = np.hypot(q[0], q[1])
+        inverses = np.moveaxis(self.inverses, 0, -1).take(which, axis=2)
+        q = (inverses * normals).sum(axis=1) / power - self.centres.T.take(which, axis=1)
+        distance = np.sqrt(q[0] * q[0] + q[1] * q[1])
         # The rim belongs to the cone.
         distance[distance <= 1.0 + RIM] = 1.0
-        # |y| - q.y + y'My/2 in y = R_k (x - x_k) is least near y along q, this far out:
-        bend = np.einsum("im,mij,jm->m", q, self.bends[which], q) + FLAT * distance**2
-        y = q * np.maximum((distance - 1.0) * distance / bend, 0.0)
-        move = np.einsum("mij,im->jm", self.inverses[which], y)
-        kink = self.points[which].T
-        points = np.sign(power) * (kink + move - kink * ((normals * move).sum(axis=0) / power))
+        beyond = np.flatnonzero(distance > 1.0)
+        if len(beyond):
+            points[:, beyond] += self._way(
+                which[beyond],
+                *(each.take(beyond, axis=-1) for each in (normals / power, q, distance)),
+            )
+        points *= np.sign(power)
         return distance, points
 
-    def _nearest(self, normals: Floats) -> NDArray[np.intp]:
+    def _way(self, which: Places, normals: Floats, q: Floats, distance: Floats) -> Floats:
+        """Return the ways (3, m) from corners to the points to expect beyond their cones.
+
+        |y| - q.y + y'My/2 in y = R_k (x - x_k) is least near y along q.
+        """
+        bends = np.moveaxis(self.bends, 0, -1).take(which, axis=2)
+        bend = ((bends * q).sum(axis=1) * q).sum(axis=0) + FLAT * distance**2
+        y = q * ((distance - 1.0) * distance / bend)
+        inverses = np.moveaxis(self.inverses, 0, -1).take(which, axis=2)
+        move = (inverses * y[:, np.newaxis]).sum(axis=0)
+        return np.asarray(move - self.points.T.take(which, axis=1) * (normals * move).sum(axis=0))
+
+    def _nearest(self, normals: Floats) -> Places:
         """Return which corner is nearest to each normal, (m,)."""
         which = np.empty(normals.shape[1], dtype=np.intp)
         count = max(1, _ELEMENTS // len(self.points))

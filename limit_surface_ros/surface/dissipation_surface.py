@@ -9,15 +9,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limit_surface_ros.checks import as_directions, one_direction
 from limit_surface_ros.surface.dissipation_terms import FormTerms
 from limit_surface_ros.surface.gauge_inverse import ConvexInverse
 from limit_surface_ros.surface.one_load import norm_gradient_of_one, one_load_terms
 from limit_surface_ros.surface.one_motion import OneMotion
 from limit_surface_ros.surface.quadratic_form import root_of
 from limit_surface_ros.surface.scaled_surface import ScaledSurface
-from limit_surface_ros.surface.sphere import even_directions
+from limit_surface_ros.surface.sphere import even_directions, of_unit_length
+from limit_surface_ros.surface.tabulated_inverse import TabulatedInverse
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.surface.dissipation_terms import DissipationTerms
     from limit_surface_ros.surface.gauge_inverse import Inverse
@@ -63,7 +67,7 @@ class DissipationSurface(ScaledSurface):
 
     @cached_property
     def _inverse(self) -> Inverse:
-        return self._inverse_of_any
+        return TabulatedInverse(self._terms, self._inverse_of_any)
 
     @cached_property
     def _inverse_of_any(self) -> ConvexInverse:
@@ -92,11 +96,30 @@ class DissipationSurface(ScaledSurface):
             return None
         return OneMotion(np.array([root_of(form) for form in forms]), self._inverse_of_any)
 
+    def twist_and_load_factor(self, wrench: ArrayLike) -> tuple[Floats, Floats]:
+        """Direction of the incipient motion and load factor, found together; see the base."""
+        one = one_direction(wrench)
+        found = None if one is None else self._motion_of_one(one)
+        if found is not None:
+            motion, factor = found
+            return np.array(self._twist_along(motion)), np.float64(factor)
+        array = as_directions("wrench", wrench)
+        twists, factors = np.empty((array.size // 3, 3)), np.empty(array.size // 3)
+        for block, columns, sizes in self._blocks(array, self.scaling.wrench_unit):
+            motions, factors[block] = self._solve(columns)
+            factors[block] *= sizes
+            np.multiply(of_unit_length(motions).T, self.scaling.twist_unit, out=twists[block])
+        return twists.reshape(array.shape), factors.reshape(array.shape[:-1])[()]
+
     def _twist_of_one(self, wrench: Vector) -> Vector | None:
         found = self._motion_of_one(wrench)
         if found is None:
             return None
-        (x, y, z), _ = found
+        return self._twist_along(found[0])
+
+    def _twist_along(self, motion: Vector) -> Vector:
+        """Return the twist of unit norm along one scaled motion."""
+        x, y, z = motion
         length = sqrt(x * x + y * y + z * z)
         return x / length, y / length, z / (length * self.scaling.characteristic_length)
 
@@ -136,8 +159,7 @@ class DissipationSurface(ScaledSurface):
         return self._terms.gradient(twists)
 
     def _twists(self, loads: Floats) -> Floats:
-        twists = self._solve(loads)[0]
-        return np.asarray(twists / np.sqrt((twists * twists).sum(axis=0)))
+        return of_unit_length(self._solve(loads)[0])
 
     def _load_factors(self, loads: Floats) -> Floats:
         factors = np.zeros(loads.shape[1])

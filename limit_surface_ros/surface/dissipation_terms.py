@@ -44,17 +44,22 @@ class FormTerms:
         self._roots = roots
         self._forms = np.swapaxes(roots, 1, 2) @ roots
         self._sizes = np.sqrt(np.trace(self._forms, axis1=1, axis2=2))
+        self._stacked_roots = roots.reshape(-1, 3)
+        self._least = KINK * self._sizes
 
     def gradient(self, twists: Floats) -> Floats:
-        """Return the gradient (3, m) of D; a term at its kink adds nothing."""
-        length = np.sqrt((twists * twists).sum(axis=0))
-        total: Floats = np.zeros_like(twists)
-        for root, size in zip(self._roots, self._sizes, strict=True):
-            image = root @ twists
-            norm = np.sqrt((image * image).sum(axis=0))
-            norm[norm <= KINK * size * length] = np.inf
-            total += root.T @ (image / norm)
-        return total
+        """Return the gradient (3, m) of D; a term at its kink adds nothing.
+
+        In the precision of the twists.
+        """
+        roots = self._stacked_roots.astype(twists.dtype, copy=False)
+        images = (roots @ twists).reshape(-1, 3, twists.shape[1])
+        norms = np.sqrt(np.einsum("kcm,kcm->km", images, images))
+        length = np.abs(twists).max(axis=0)
+        if (norms.min(axis=1) <= self._least * length.max()).any():
+            norms[norms <= self._least[:, np.newaxis] * length] = np.inf
+        images /= norms[:, np.newaxis]
+        return np.asarray(roots.T @ images.reshape(-1, twists.shape[1]))
 
     def values(self, twists: Floats) -> Floats:
         """Return D (m,)."""

@@ -11,17 +11,11 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 import numpy as np
 
 from limit_surface_ros.surface.plane_minimum import Gauge, certain_minimum, plane_minimum
-from limit_surface_ros.surface.sphere import even_directions
+from limit_surface_ros.surface.sphere import even_directions, of_unit_length
 
 if TYPE_CHECKING:
-    from typing import TypeAlias
-
-    from numpy.typing import NDArray
-
-    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.checks import Bools, Floats, Places
     from limit_surface_ros.surface.corners import Corners
-
-    Places: TypeAlias = NDArray[np.intp]
 
 # Neighbours of a start among which it must be best to be a peak.
 _NEIGHBOURS = 8
@@ -83,33 +77,48 @@ class ConvexInverse:
         Raises:
             SolverError: A point could not be certified.
         """
-        units = normals / np.sqrt((normals * normals).sum(axis=0))
-        points, gradients, hessians = self.starts(units)
-        initial = np.ones(units.shape[1]), gradients, hessians
-        smooth = np.arange(units.shape[1])
-        if self.corners is not None:
-            distance, near = self.corners.nearest(units)
-            in_cone = distance <= 1.0
-            points[:, in_cone] = near[:, in_cone]
-            smooth = np.flatnonzero(~in_cone)
-            beside = smooth[distance[smooth] < _BESIDE]
-            power = (units * near).sum(axis=0)[beside] / self._gauge.values(near[:, beside])
-            beside = beside[power > (units * points).sum(axis=0)[beside]]
-            points[:, beside] = near[:, beside]
-            found = self._gauge.derivatives(near[:, beside], np.zeros(len(beside)))
-            initial[0][beside], initial[1][:, beside], initial[2][:, :, beside] = found
-        if len(smooth):
-            known = initial[0][smooth], initial[1][:, smooth], initial[2][:, :, smooth]
-            points[:, smooth] = certain_minimum(
-                self._gauge, units[:, smooth], points[:, smooth], known
-            )
+        units = of_unit_length(normals)
+        if self.corners is None:
+            points = self._climb(units)
+        else:
+            distance, points = self.corners.nearest(units)
+            smooth = np.flatnonzero(distance > 1.0)
+            if len(smooth):
+                near = points.take(smooth, axis=1)
+                beside = distance[smooth] < _BESIDE
+                points[:, smooth] = self._climb(units.take(smooth, axis=1), near, beside)
         points /= self._gauge.values(points)
         return points, (normals * points).sum(axis=0)
+
+    def _climb(
+        self, units: Floats, near: Floats | None = None, beside: Bools | None = None
+    ) -> Floats:
+        """Return the points of most power for unit vectors (3, m), from the better of two starts.
+
+        Args:
+            units: The vectors.
+            near: Points (3, m) by the corners nearest to them.
+            beside: Where these are worth a look, (m,).
+        """
+        points, gradients, hessians = self.starts(units)
+        values = np.ones(units.shape[1])
+        if near is not None and beside is not None:
+            near = near / self._gauge.values(near)
+            better = (units * near).sum(axis=0) > (units * points).sum(axis=0)
+            place = np.flatnonzero(beside & better)
+            points[:, place] = near = near.take(place, axis=1)
+            found = self._gauge.derivatives(near, np.zeros(len(place)))
+            values[place], gradients[:, place], hessians[:, :, place] = found
+        return certain_minimum(self._gauge, units, points, (values, gradients, hessians))
 
     def starts(self, normals: Floats) -> tuple[Floats, Floats, Floats]:
         """Return starts (3, m) for vectors (3, m), with their gradients and Hessians (3, 3, m)."""
         which = np.argmax(normals.T @ self._starts, axis=1)
-        return self._starts[:, which], self._gradients[:, which], self._hessians[:, :, which]
+        return (
+            self._starts.take(which, axis=1),
+            self._gradients.take(which, axis=1),
+            self._hessians.take(which, axis=2),
+        )
 
     def starts_of_one(self, normal: Floats) -> Floats:
         """Return the start for one vector (3,), none where a corner might be the answer."""
@@ -144,7 +153,7 @@ class PeakInverse:
 
     def solve(self, normals: Floats) -> tuple[Floats, Floats]:
         """Return the points (3, m) of most power for vectors (3, m), and that power (m,)."""
-        units = normals / np.sqrt((normals * normals).sum(axis=0))
+        units = of_unit_length(normals)
         found = [
             self._peaks(units[:, start : start + _TABLE_COLUMNS])
             for start in range(0, units.shape[1], _TABLE_COLUMNS)
@@ -153,13 +162,14 @@ class PeakInverse:
         columns = np.concatenate(
             [column + _TABLE_COLUMNS * block for block, (_, column) in enumerate(found)]
         )
-        points = self._climb(units[:, columns], self._ellipsoids[rows])
-        power = (points * units[:, columns]).sum(axis=0)
+        climbed = units.take(columns, axis=1)
+        points = self._climb(climbed, self._ellipsoids[rows])
+        power = (points * climbed).sum(axis=0)
         # The highest comes last, and stays.
         rising = np.argsort(power)
         best = np.zeros(units.shape[1], dtype=np.intp)
         best[columns[rising]] = rising
-        summits: Floats = points[:, best]
+        summits = points.take(best, axis=1)
         return summits, (normals * summits).sum(axis=0)
 
     def starts_of_one(self, normal: Floats) -> Floats:

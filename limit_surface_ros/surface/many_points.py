@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from limit_surface_ros.surface.plane_minimum import newton_moves, plane_basis
+from limit_surface_ros.surface.sphere import of_unit_length
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -63,7 +64,7 @@ class ManyPointsInverse:
         Raises:
             SolverError: A twist could not be certified.
         """
-        units = normals / np.sqrt((normals * normals).sum(axis=0))
+        units = of_unit_length(normals)
         basis = plane_basis(units)
         points, hessians = self._approach(units, basis)
         points, values, settled = self._settle(units, basis, points, hessians)
@@ -77,6 +78,12 @@ class ManyPointsInverse:
         """Return no start: beside a support point none leads smoothly to the answer."""
         return np.empty((0, 3))
 
+    def gradient(self, twists: Floats) -> Floats:
+        """Return the gradients (3, m) of D, NaN where a point is near to rest."""
+        gradients, clear = self._gradients(of_unit_length(twists))
+        gradients[:, ~clear] = np.nan
+        return gradients
+
     def _approach(self, units: Floats, basis: Floats) -> tuple[Floats, Floats]:
         """Return twists (3, m) right to single precision, and Hessians (3, 3, m) close by."""
         points, gradients, hessians = self._general.starts(units)
@@ -88,7 +95,7 @@ class ManyPointsInverse:
             moves, _, _ = newton_moves(
                 units[:, todo], basis[:, :, todo], points[:, todo], gradients, hessians[:, :, todo]
             )
-            points[:, todo] = _of_unit_length(points[:, todo] + moves)
+            points[:, todo] = of_unit_length(points[:, todo] + moves)
             todo = todo[(moves * moves).sum(axis=0) > _COARSE_STEP**2]
             if len(todo) == 0:
                 break
@@ -175,11 +182,6 @@ class ManyPointsInverse:
                     slice(first, first + height),
                     array[: height * width].reshape(height, width),
                 )
-
-
-def _of_unit_length(points: Floats) -> Floats:
-    units: Floats = points / np.sqrt((points * points).sum(axis=0))
-    return units
 
 
 def _square_weights(twists: Floats) -> Floats:

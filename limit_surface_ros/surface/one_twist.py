@@ -9,12 +9,15 @@ from __future__ import annotations
 from math import exp, hypot, log, sqrt
 from typing import TYPE_CHECKING
 
-from limit_surface_ros.surface.one_load import gauge_of_one, log_scale_of_one
+from limit_surface_ros.surface.one_load import gauge_of_one, log_scale_of_one, norm_of_one
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
+    from typing import TypeAlias
 
     from limit_surface_ros.surface.one_load import Term, Vector
+
+    Newton: TypeAlias = tuple[float, tuple[float, float], tuple[float, float]]
 
 _STEPS = 30
 # A form below this would make its term's curvature lose its digits: a corner is near.
@@ -64,19 +67,20 @@ def _climb(terms: Sequence[Term], twist: Vector, start: Vector) -> Vector | None
     q = (start[0] * second[0] + start[1] * second[1] + start[2] * second[2]) / along
     # In the plane a form is q0 + 2 (b1 p + b2 q) + a11 p^2 + 2 a12 p q + a22 q^2.
     forms = [_in_plane(term, (nx, ny, nz), first, second) for term in terms]
+    norms = all(term[0] == 0.5 for term in terms)
     previous = float("inf")
     step_p = step_q = 0.0
     for _ in range(_STEPS):
-        found = _newton(terms, forms, p, q)
+        found = _norms_newton(forms, p, q) if norms else _newton(terms, forms, p, q)
         if found is None:
             return None
-        t, gradient, move = found
-        if -t > previous + 1e-15:
+        height, gradient, move = found
+        if height > previous + 1e-15:
             step_p, step_q = 0.5 * step_p, 0.5 * step_q
             p -= step_p
             q -= step_q
             continue
-        previous = -t
+        previous = height
         step_p, step_q = move
         sine = hypot(*gradient) / abs(1.0 - p * gradient[0] - q * gradient[1])
         step = hypot(*move) / sqrt(1.0 + p * p + q * q)
@@ -91,7 +95,7 @@ def _climb(terms: Sequence[Term], twist: Vector, start: Vector) -> Vector | None
                 ny + p * first[1] + q * second[1],
                 nz + p * first[2] + q * second[2],
             )
-            gauge = gauge_of_one(terms, load)
+            gauge = norm_of_one(terms, load) if norms else gauge_of_one(terms, load)
             return None if gauge is None else (load[0] / gauge, load[1] / gauge, load[2] / gauge)
     return None
 
@@ -121,10 +125,32 @@ def _value(form: tuple[float, ...], p: float, q: float) -> float:
     return q0 + p * (2.0 * b1 + a11 * p + 2.0 * a12 * q) + q * (2.0 * b2 + a22 * q)
 
 
+def _norms_newton(forms: list[tuple[float, ...]], p: float, q: float) -> Newton | None:
+    """Return what `_newton` does where all exponents are 1/2, so that g is a sum of roots."""
+    gauge = g1 = g2 = h11 = h12 = h22 = 0.0
+    for q0, b1, b2, a11, a12, a22 in forms:
+        c1, c2 = b1 + a11 * p + a12 * q, b2 + a12 * p + a22 * q
+        value = q0 + p * (b1 + c1) + q * (b2 + c2)
+        if not value > _SMALL * (q0 + a11 * p * p + a22 * q * q):
+            return None
+        norm = sqrt(value)
+        gauge += norm
+        weight = 1.0 / norm
+        c1 *= weight
+        c2 *= weight
+        g1 += c1
+        g2 += c2
+        h11 += weight * (a11 - c1 * c1)
+        h12 += weight * (a12 - c1 * c2)
+        h22 += weight * (a22 - c2 * c2)
+    move = _newton_move(g1, g2, h11, h12, h22)
+    return None if move is None else (log(gauge), (g1 / gauge, g2 / gauge), move)
+
+
 def _newton(
     terms: Sequence[Term], forms: list[tuple[float, ...]], p: float, q: float
-) -> tuple[float, tuple[float, float], tuple[float, float]] | None:
-    """Return t = -log g, the gradient of log g and Newton's move for g; see `PowerGauge`."""
+) -> Newton | None:
+    """Return log g, its gradient, and Newton's move for g; see `PowerGauge`."""
     values = [_value(form, p, q) for form in forms]
     for value, form in zip(values, forms, strict=True):
         if not value > _SMALL * (form[0] + form[3] * p * p + form[5] * q * q):
@@ -154,14 +180,15 @@ def _newton(
     h11 = (k11 - 2.0 * m1 * g1) / total + both * g1 * g1
     h12 = (k12 - m1 * g2 - m2 * g1) / total + both * g1 * g2
     h22 = (k22 - 2.0 * m2 * g2) / total + both * g2 * g2
+    move = _newton_move(g1, g2, h11, h12, h22)
+    return None if move is None else (-t, (g1, g2), move)
+
+
+def _newton_move(
+    g1: float, g2: float, h11: float, h12: float, h22: float
+) -> tuple[float, float] | None:
+    """Return the move to the minimum for a gradient and a Hessian, None if that is near flat."""
     determinant = h11 * h22 - h12 * h12
     if not (determinant > 1e-10 * (h11 + h22) ** 2 and h11 > 0.0):
         return None
-    return (
-        t,
-        (g1, g2),
-        (
-            (h12 * g2 - h22 * g1) / determinant,
-            (h12 * g1 - h11 * g2) / determinant,
-        ),
-    )
+    return (h12 * g2 - h22 * g1) / determinant, (h12 * g1 - h11 * g2) / determinant

@@ -7,7 +7,7 @@ dissipation as gauge this takes loads to twists, with a surface's load factor tw
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -70,16 +70,17 @@ def certain_minimum(
     hard = np.flatnonzero(~settled | (sines > _PARALLEL))
     if len(hard) == 0:
         return found
-    path = before = found[:, hard]
+    path = before = found.take(hard, axis=1)
+    across = normals.take(hard, axis=1)
     for size in _SMOOTHINGS:
         start = path + _RATIO * (path - before)
         before = path
-        path, ended, _ = plane_minimum(gauge, normals[:, hard], start, np.full(len(hard), size))
+        path, ended, _ = plane_minimum(gauge, across, start, np.full(len(hard), size))
     certain = ended | settled[hard]
     if not certain.all():
         normal = normals[:, hard[np.argmin(certain)]].tolist()
         raise SolverError(f"no answer could be certified for the scaled direction {normal}")
-    lower = gauge.values(path) < gauge.values(found[:, hard])
+    lower = gauge.values(path) < gauge.values(found.take(hard, axis=1))
     better = ended & (lower | ~settled[hard])
     found[:, hard[better]] = path[:, better]
     return found
@@ -126,19 +127,24 @@ def plane_minimum(
         result[:, todo] = points + np.where(last, moves, 0.0)
         keep = ~last & (sines > _TARGET)
         if not keep.all():
-            todo, normals, smoothing = todo[keep], normals[:, keep], smoothing[keep]
-            points, moves, slopes = points[:, keep], moves[:, keep], slopes[keep]
-            basis, values = basis[:, :, keep], values[keep]
+            todo, normals, basis, smoothing, points, moves, slopes, values = kept(
+                keep, todo, normals, basis, smoothing, points, moves, slopes, values
+            )
         if len(todo) == 0:
             break
         points, moved, values, gradients, hessians = _line_search(
             gauge, points, moves, values, slopes, smoothing
         )
         if not moved.all():
-            todo, normals, smoothing = todo[moved], normals[:, moved], smoothing[moved]
-            points, basis, values = points[:, moved], basis[:, :, moved], values[moved]
-            gradients, hessians = gradients[:, moved], hessians[:, :, moved]
+            todo, normals, basis, smoothing, points, values, gradients, hessians = kept(
+                moved, todo, normals, basis, smoothing, points, values, gradients, hessians
+            )
     return result, settled, angles
+
+
+def kept(keep: Bools, *arrays: Any) -> list[Any]:
+    """Return the columns of arrays (..., m) that are kept, contiguous: `a[:, keep]` is not."""
+    return [array.compress(keep, axis=-1) for array in arrays]
 
 
 def newton_moves(
@@ -202,9 +208,10 @@ def _line_search(
         if len(high) == 0:
             break
         step *= 0.5
-        trial[:, high] = points[:, high] + step * moves[:, high]
+        shorter = points.take(high, axis=1) + step * moves.take(high, axis=1)
+        trial[:, high] = shorter
         new_values[high], gradients[:, high], hessians[:, :, high] = gauge.derivatives(
-            trial[:, high], smoothing[high]
+            shorter, smoothing[high]
         )
         bound = values[high] * (1.0 + 1e-15) + 1e-4 * step * slopes[high]
         high = high[new_values[high] > bound]

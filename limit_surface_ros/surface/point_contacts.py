@@ -15,6 +15,7 @@ from limit_surface_ros.surface.dissipation_surface import DissipationSurface
 from limit_surface_ros.surface.dissipation_terms import PointTerms
 from limit_surface_ros.surface.many_points import ManyPointsInverse
 from limit_surface_ros.surface.scaling import Scaling
+from limit_surface_ros.surface.tabulated_inverse import TabulatedInverse
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
@@ -109,8 +110,8 @@ class PointContacts(DissipationSurface):
 
     @cached_property
     def _inverse(self) -> Inverse:
-        general = self._inverse_of_any
         terms = self._terms
         if len(terms.points) < _MANY or np.abs(terms.points).max() > _FAR:
-            return general
-        return ManyPointsInverse(terms.points, terms.limits, general)
+            return super()._inverse
+        many = ManyPointsInverse(terms.points, terms.limits, self._inverse_of_any)
+        return TabulatedInverse(many, many)

@@ -22,7 +22,8 @@ from limit_surface_ros.surface.gauge_inverse import (
 )
 from limit_surface_ros.surface.scaled_surface import ScaledSurface
 from limit_surface_ros.surface.scaling import Scaling
-from limit_surface_ros.surface.sphere import even_directions
+from limit_surface_ros.surface.sphere import even_directions, of_unit_length
+from limit_surface_ros.surface.tabulated_inverse import TabulatedInverse
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -93,6 +94,12 @@ class Polynomial(ScaledSurface):
         """Return the gauge P^(1/4) (m,) of scaled loads (3, m); see `plane_minimum.Gauge`."""
         return self._load_factors(loads)
 
+    def gauge_gradient(self, loads: Floats) -> Floats:
+        """Return the gradient (3, m) of the gauge P^(1/4) at scaled loads (3, m)."""
+        gradient = self._gradient(loads)[0]
+        value = (gradient * loads).sum(axis=0) / 4.0
+        return np.asarray(gradient * (0.25 * value**-0.75))
+
     def derivatives(self, loads: Floats, _smoothing: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the gauge P^(1/4) of scaled loads (3, m); see `plane_minimum.Gauge`."""
         gradient, hessian = self._gradient(loads)
@@ -107,8 +114,7 @@ class Polynomial(ScaledSurface):
         return np.asarray(np.sqrt(np.sqrt(values)))
 
     def _twists(self, loads: Floats) -> Floats:
-        gradient = self._gradient(loads)[0]
-        return np.asarray(gradient / np.sqrt((gradient * gradient).sum(axis=0)))
+        return of_unit_length(self._gradient(loads)[0])
 
     def _loads(self, twists: Floats) -> Floats:
         return self._inverse.solve(twists)[0]
@@ -123,7 +129,8 @@ class Polynomial(ScaledSurface):
         )
         # The gauge is flat along the ray; any curvature below that bends inward.
         if curvatures[:, 0].min() > -1e-9 * curvatures[:, -1].max():
-            return FramedInverse(frame, ConvexInverse(round_surface, directions))
+            climb = ConvexInverse(round_surface, directions)
+            return FramedInverse(frame, TabulatedInverse(round_surface, climb))
         return FramedInverse(frame, PeakInverse(round_surface, directions[:, _STARTS:]))
 
     def _gradient(self, loads: Floats) -> tuple[Floats, Floats]:
@@ -143,6 +150,10 @@ class _Framed:
 
     def values(self, points: Floats) -> Floats:
         return self._polynomial.values(self._frame @ points)
+
+    def gradient(self, points: Floats) -> Floats:
+        turned: Floats = self._frame.T @ self._polynomial.gauge_gradient(self._frame @ points)
+        return turned
 
     def derivatives(self, points: Floats, smoothing: Floats) -> tuple[Floats, Floats, Floats]:
         gauge, gradient, hessian = self._polynomial.derivatives(self._frame @ points, smoothing)

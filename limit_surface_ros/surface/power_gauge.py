@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.surface.corners import Corners
-from limit_surface_ros.surface.power_sum_scale import log_scales
+from limit_surface_ros.surface.power_sum_scale import log_scales, scale_and_shares
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
@@ -27,6 +27,18 @@ class PowerGauge:
         """Return g (m,)."""
         images = self._roots @ loads
         return np.exp(-log_scales(np.einsum("kcm,kcm->km", images, images), self._exponents))
+
+    def gradient(self, loads: Floats) -> Floats:
+        """Return the gradient (3, m) of g; a term that does not see a load adds nothing."""
+        roots = self._roots.reshape(-1, 3)
+        images = (roots @ loads).reshape(-1, 3, loads.shape[1])
+        values = np.einsum("kcm,kcm->km", images, images)
+        t, weights = scale_and_shares(values, self._exponents)
+        weights *= self._exponents[:, np.newaxis]
+        weights /= weights.sum(axis=0) * np.exp(t)
+        weights /= np.where(values > 0.0, values, np.inf)
+        images *= weights[:, np.newaxis]
+        return np.asarray(roots.T @ images.reshape(-1, loads.shape[1]))
 
     def derivatives(self, loads: Floats, smoothing: Floats) -> tuple[Floats, Floats, Floats]:
         """Return g, its gradient and its Hessian; see `plane_minimum.Gauge`.

@@ -17,6 +17,7 @@ from limit_surface_ros.surface.power_gauge import PowerGauge
 from limit_surface_ros.surface.power_sum_scale import log_scales
 from limit_surface_ros.surface.quadratic_form import root_of
 from limit_surface_ros.surface.sphere import even_directions
+from limit_surface_ros.surface.tabulated_inverse import TabulatedInverse
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
@@ -59,7 +60,8 @@ def power_sum_inverse(roots: Floats, exponents: Floats) -> Inverse:
         return EllipsoidInverse(roots[0])
     if (exponents == 0.5).all():
         norms = FormTerms(roots)
-        return ConvexInverse(norms, even_directions(_CONVEX_STARTS).T, norms.corners())
+        climb = ConvexInverse(norms, even_directions(_CONVEX_STARTS).T, norms.corners())
+        return TabulatedInverse(norms, climb)
     frame = round_frame(PowerGauge(roots, exponents))
     return FramedInverse(frame, _inverse_of_round(roots @ frame, exponents))
 
@@ -68,7 +70,8 @@ def _inverse_of_round(roots: Floats, exponents: Floats) -> Inverse:
     """Return the inverse for a surface about as wide in all directions."""
     gauge = PowerGauge(roots, exponents)
     if (exponents >= 0.5).all():
-        return ConvexInverse(gauge, even_directions(_CONVEX_STARTS).T, gauge.corners())
+        climb = ConvexInverse(gauge, even_directions(_CONVEX_STARTS).T, gauge.corners())
+        return TabulatedInverse(gauge, climb)
     summits = PeakInverse(gauge, _starts(roots, exponents))
     ranks = np.abs(roots).any(axis=2).sum(axis=1)
     low = exponents <= 0.5

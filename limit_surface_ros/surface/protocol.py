@@ -55,6 +55,17 @@ class LimitSurface(Protocol):
         """
         ...
 
+    def twist_and_load_factor(self, wrench: ArrayLike) -> tuple[Floats, Floats]:
+        """Both of the above, at the cost of one where a kind finds them together.
+
+        Args:
+            wrench: Shape (..., 3), not zero.
+
+        Returns:
+            Twists, shape (..., 3), and load factors, shape (...).
+        """
+        ...
+
     def wrench_of_twist(self, twist: ArrayLike) -> Floats:
         """Load of maximum dissipation: the wrench on the surface with the most power.
 

@@ -70,7 +70,7 @@ class ScaledSurface(ABC):
     @property
     def _block_columns(self) -> int:
         """Columns per block: a few dozen arrays of this length stay in the processor's cache."""
-        return 4096
+        return 10240
 
     def scaled(self: Self, factor: float) -> Self:
         """Return the surface with every wrench on it multiplied by `factor`.
@@ -132,6 +132,22 @@ class ScaledSurface(ABC):
                 return np.array(twist)
         array = as_directions("wrench", wrench)
         return self._mapped(array, self.scaling.wrench_unit, self._twists, self.scaling.twist_unit)
+
+    def twist_and_load_factor(self, wrench: ArrayLike) -> tuple[Floats, Floats]:
+        """Direction of the incipient motion and load factor, at the cost of one if that is less.
+
+        Args:
+            wrench: Shape (..., 3), (fx, fy, tau_z) in [N, N, N m], not zero.
+
+        Returns:
+            Twists as `twist_of_wrench` gives them, shape (..., 3), and load factors, shape (...).
+
+        Raises:
+            ShapeError: The last axis does not hold three components.
+            NotFiniteError: A component is NaN or infinite.
+            ZeroVectorError: A wrench is zero.
+        """
+        return self.twist_of_wrench(wrench), self.load_factor(wrench)
 
     def wrench_of_twist(self, twist: ArrayLike) -> Floats:
         """Load of maximum dissipation: the wrench on the surface with the most power.

@@ -1,4 +1,4 @@
-"""Directions spread evenly over the unit sphere."""
+"""The unit sphere: directions spread evenly over it, and vectors brought onto it."""
 
 from __future__ import annotations
 
@@ -20,3 +20,8 @@ def even_directions(count: int) -> Floats:
     angle = np.pi * (1.0 + np.sqrt(5.0)) * index
     radius = np.sqrt(1.0 - z * z)
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
+
+
+def of_unit_length(columns: Floats) -> Floats:
+    """Return vectors (3, m), none zero, divided by their lengths."""
+    return np.asarray(columns / np.sqrt((columns * columns).sum(axis=0)))

@@ -115,3 +115,14 @@ def test_the_lean_path_finds_the_same_motion_for_any_sum_of_norms(seed):
         power = (loads * twists).sum(axis=1) / factors
         most = (surface.wrench_of_twist(twists) * twists).sum(axis=1)
         np.testing.assert_allclose(power, most, rtol=1e-11)
+
+
+@pytest.mark.parametrize("surface", SURFACES, ids=lambda surface: surface.kind)
+@pytest.mark.parametrize("shape", [(3,), (1, 3), (4, 5, 3)])
+def test_motion_and_load_factor_together_are_what_they_are_alone(surface, shape):
+    wrenches = 1e3 * RNG.standard_normal(shape)
+    twists, factors = surface.twist_and_load_factor(wrenches)
+    assert twists.shape == shape
+    assert factors.shape == shape[:-1]
+    np.testing.assert_allclose(twists, surface.twist_of_wrench(wrenches), atol=1e-12)
+    np.testing.assert_allclose(factors, surface.load_factor(wrenches), rtol=1e-12)

@@ -1,0 +1,246 @@
+"""Many points of most power at once: read from a table, then proved one by one.
+
+The power of the best point, D(n) = max n.x over a surface, is a gauge itself, with the point as
+its gradient. A table of quintic polynomials holds D on half the sphere, and a point read from it
+is almost right. The surface's own gradient there tells the normal for which it is *exactly* right,
+and from that normal to the wanted one it is so short a way that the table's curvature leads along
+it. A second gradient proves the answer. Where it does not, as across a kink, the inverse that made
+the table solves.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from limit_surface_ros.checks import Bools, Floats, Places
+    from limit_surface_ros.surface.gauge_inverse import Inverse
+
+# Cells of the table along each axis of the chart.
+_CELLS = 48
+# Powers of x and y in a cell's polynomial, y by y for each power of x.
+_DEGREE = 5
+_POWERS = [(i, j) for i in range(_DEGREE + 1) for j in range(_DEGREE + 1 - i)]
+# Vectors after which a table is made: as many as it takes to make one.
+_WORTH = (2 * _CELLS + 1) ** 2
+# Steps along the curvature until a point counts as hard.
+_STEPS = 6
+# Distance in the chart within which a last step proves the point; its own error is a part of that.
+_LAST_STEP = 1e-10
+
+
+class FirstOrder(Protocol):
+    """A gauge with its gradient; see `plane_minimum.Gauge`."""
+
+    def gradient(self, points: Floats, /) -> Floats:
+        """Return the gradients (3, m) at points (3, m); what is at a kink adds nothing."""
+        ...
+
+
+class TabulatedInverse:
+    """The inverse of a convex gauge, with a table from the moment that it pays."""
+
+    def __init__(self, gauge: FirstOrder, inverse: Inverse) -> None:
+        """Keep the gauge and its inverse, which makes the table and solves what is hard."""
+        self._gauge = gauge
+        self._inverse = inverse
+        self._asked = 0
+        self._table: SupportTable | None = None
+
+    def solve(self, normals: Floats) -> tuple[Floats, Floats]:
+        """Return the points (3, m) of most power for vectors (3, m), and that power (m,).
+
+        Raises:
+            SolverError: A point could not be certified.
+        """
+        if self._table is None:
+            self._asked += normals.shape[1]
+            if self._asked <= _WORTH:
+                return self._inverse.solve(normals)
+            self._table = SupportTable(self._gauge, self._inverse)
+        points, certain = self._table.points(normals)
+        hard = np.flatnonzero(~certain)
+        if len(hard):
+            points[:, hard] = self._inverse.solve(normals[:, hard])[0]
+        return points, (normals * points).sum(axis=0)
+
+    def starts_of_one(self, normal: Floats) -> Floats:
+        """Return points (s, 3) that lead smoothly to the answer for one vector (3,), if any do."""
+        return self._inverse.starts_of_one(normal)
+
+
+class SupportTable:
+    """The support function D of a convex surface g(x) = 1, on a stereographic chart.
+
+    A normal n with n_z >= 0 is (|n| + n_z) w, where w = (a, b, (1 - a^2 - b^2) / 2) and
+    (a, b) = (n_x, n_y) / (|n| + n_z) lies in the unit disc. With h(a, b) = D(w) the point is
+
+        x = (h_a + a z, h_b + b z, z),   z = 2 (h - a h_a - b h_b) / (1 + a^2 + b^2).
+
+    The surface is its own mirror image: -n has the point -x.
+    """
+
+    def __init__(self, gauge: FirstOrder, inverse: Inverse) -> None:
+        """Fit the polynomials to points that the inverse finds, and try them between these.
+
+        Raises:
+            SolverError: A point could not be certified.
+        """
+        self._gauge = gauge
+        places = _grid(np.linspace(-1.0, 1.0, 2 * _CELLS + 1))
+        normals = _normals(places)
+        points, height = inverse.solve(normals)
+        slopes = points[:2] - points[2] * places
+        samples = np.array([height, *slopes / _CELLS]).reshape(3, 2 * _CELLS + 1, -1)
+        # Rounding to single precision is mended by the steps that follow.
+        with np.errstate(over="ignore", under="ignore"):
+            self._coefficients = _quintics(samples).astype(np.float32)
+        # A cell that proves nothing, as within a corner's cone, is not worth reading.
+        self._useful = np.ones(_CELLS**2, dtype=bool)
+        middles = _grid((np.arange(2 * _CELLS) + 0.5) / _CELLS - 1.0)
+        _, certain = self.points(_normals(middles))
+        self._useful = certain.reshape(_CELLS, 2, _CELLS, 2).any(axis=(1, 3)).ravel()
+
+    def points(self, normals: Floats) -> tuple[Floats, Bools]:
+        """Return points (3, m) for vectors (3, m), none zero, and which are certain (m,)."""
+        sign = np.where(normals[2] < 0.0, -1.0, 1.0)
+        place = _chart(normals * sign)
+        row, column = np.minimum((0.5 * _CELLS * (place + 1.0)).astype(np.intp), _CELLS - 1)
+        cell = row * _CELLS + column
+        certain = self._useful.take(cell)
+        # What runs out of digits or numbers on the way ends as not certain.
+        with np.errstate(all="ignore"):
+            if certain.all():
+                points, certain = self._prove(place, cell)
+            else:
+                points = np.zeros_like(normals)
+                some = np.flatnonzero(certain)
+                found = self._prove(place.take(some, axis=1), cell.take(some))
+                points[:, some], certain[some] = found
+        points *= sign
+        return points, certain
+
+    def _prove(self, place: Floats, cell: Places) -> tuple[Floats, Bools]:
+        """Return points (3, m) for places (2, m) in the cells (m,), and which are certain (m,)."""
+        points, bends = self._read(place, cell)
+        points, _ = self._step(points, place, bends)
+        points, away = self._step(points, place, bends)
+        certain = away <= _LAST_STEP
+        for _ in range(_STEPS - 2):
+            todo = np.flatnonzero(~certain)
+            if len(todo) == 0:
+                break
+            points[:, todo], away = self._step(
+                *(each.take(todo, axis=1) for each in (points, place, bends))
+            )
+            certain[todo] = away <= _LAST_STEP
+        return points, certain
+
+    def _step(self, points: Floats, place: Floats, bends: Floats) -> tuple[Floats, Floats]:
+        """Return points (3, m) nearer to the right ones, and how far away these were (m,)."""
+        gradient = self._gauge.gradient(points)
+        points = points / (points * gradient).sum(axis=0)
+        away = place - _chart(gradient)
+        # Moves are short: the digits that single precision keeps of them are enough.
+        a, b = place.astype(np.float32)
+        da, db = away.astype(np.float32)
+        z = points[2].astype(np.float32)
+        rise_a = bends[0] * da + bends[1] * db
+        rise_b = bends[1] * da + bends[2] * db
+        rise = a * rise_a + b * rise_b + z * (a * da + b * db)
+        rise *= -2.0 / (1.0 + a * a + b * b)
+        points[0] += rise_a + a * rise + z * da
+        points[1] += rise_b + b * rise + z * db
+        points[2] += rise
+        return points, np.abs(away).max(axis=0)
+
+    def _read(self, place: Floats, cell: Places) -> tuple[Floats, Floats]:
+        """Return points (3, m) and h_aa, h_ab, h_bb (3, m) at places (2, m) in the cells (m,)."""
+        x, y = (
+            (_CELLS * (at + 1.0) - (2 * index + 1)).astype(np.float32)
+            for at, index in zip(place, np.divmod(cell, _CELLS), strict=True)
+        )
+        read = iter(self._coefficients.take(cell, axis=1))
+        in_y = [[next(read) for _ in range(_DEGREE + 1 - i)] for i in range(_DEGREE + 1)]
+        value = [_polynomial(each, y) for each in in_y]
+        in_y = [_derivative(each) for each in in_y[:-1]]
+        slope = [_polynomial(each, y) for each in in_y]
+        bend = [_polynomial(_derivative(each), y) for each in in_y[:-1]]
+        in_x = _derivative(value)
+        height = _polynomial(value, x)
+        slope_a = _polynomial(in_x, x)
+        slope_b = _polynomial(slope, x)
+        slope_a *= _CELLS
+        slope_b *= _CELLS
+        bends = np.array(
+            [
+                _polynomial(_derivative(in_x), x),
+                _polynomial(_derivative(slope), x),
+                _polynomial(bend, x),
+            ]
+        )
+        bends *= _CELLS**2
+        a, b = place
+        z = 2.0 * (height - a * slope_a - b * slope_b) / (1.0 + a * a + b * b)
+        return np.array([slope_a + a * z, slope_b + b * z, z]), bends
+
+
+def _grid(ticks: Floats) -> Floats:
+    """Return all places (2, t * t) with both coordinates among the ticks (t,)."""
+    return np.array([each.ravel() for each in np.meshgrid(ticks, ticks, indexing="ij")])
+
+
+def _normals(places: Floats) -> Floats:
+    """Return the normals w (3, m) of places (2, m) on the chart."""
+    a, b = places
+    return np.array([a, b, 0.5 * (1.0 - a * a - b * b)])
+
+
+def _chart(normals: Floats) -> Floats:
+    """Return (a, b), shape (2, m), of normals (3, m) that are not (0, 0, -1)."""
+    x, y, z = normals
+    stretch = np.sqrt(x * x + y * y + z * z)
+    stretch += z
+    return np.asarray(normals[:2] / stretch)
+
+
+def _polynomial(coefficients: Sequence[Floats], x: Floats) -> Floats:
+    """Return c_0 + c_1 x + c_2 x^2 + ... (m,), by Horner's rule."""
+    *lower, value = coefficients
+    if lower:
+        value = value * x
+    for coefficient in reversed(lower[1:]):
+        value += coefficient
+        value *= x
+    return value + lower[0] if lower else value
+
+
+def _derivative(coefficients: Sequence[Floats]) -> list[Floats]:
+    """Return the coefficients of a polynomial's derivative."""
+    return [power * each for power, each in enumerate(coefficients)][1:]
+
+
+def _quintics(samples: Floats) -> Floats:
+    """Return the coefficients (21, cells) of the polynomials that fit nine points of each cell.
+
+    Args:
+        samples: Heights and slopes along x and y, for cells from -1 to 1, on a grid of their
+            corners and middles, shape (3, 2 n + 1, 2 n + 1).
+    """
+    i, j = np.array(_POWERS).T
+    x, y = _grid(np.array([-1.0, 0.0, 1.0]))[:, :, np.newaxis]
+    model = np.concatenate(
+        [x**i * y**j, i * x ** np.maximum(i - 1, 0) * y**j, j * x**i * y ** np.maximum(j - 1, 0)]
+    )
+    last = samples.shape[1] - 2
+    data = [
+        sample[row : row + last : 2, column : column + last : 2].ravel()
+        for sample in samples
+        for row in range(3)
+        for column in range(3)
+    ]
+    return np.asarray(np.linalg.pinv(model) @ np.array(data))

@@ -1,0 +1,146 @@
+"""Batches that pay for a table are answered from it, as exactly as one by one."""
+
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from limit_surface_ros.surface import sampling
+from limit_surface_ros.surface.dissipation import Dissipation
+from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.polynomial import Polynomial
+from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.scaling import Scaling
+from limit_surface_ros.surface.tabulated_inverse import SupportTable, TabulatedInverse
+
+MANY = 20_000
+FEW = 300
+
+
+def matrices(rng, terms, ranks=(3,)):
+    """Random matrices (terms, 3, 3) of condition numbers up to some thousands."""
+    roots = rng.standard_normal((terms, 3, 3)) * 10.0 ** rng.uniform(-1, 1, (terms, 1, 3))
+    for root in roots:
+        root[: 3 - rng.choice(ranks)] = 0.0
+    return np.swapaxes(roots, 1, 2) @ roots
+
+
+def surface_of(kind, seed):
+    rng = np.random.default_rng(seed)
+    scaling = Scaling(0.1, 5.0)
+    if kind == "norms":
+        return PowerSum.norms(matrices(rng, 4, (2, 3)), scaling)
+    if kind == "powers":
+        return PowerSum(matrices(rng, 3), rng.uniform(0.5, 1.0, 3), scaling)
+    if kind == "dissipation":
+        return Dissipation(matrices(rng, 4, (2, 3)), scaling)
+    if kind == "points":
+        return PointContacts(0.1 * rng.standard_normal((5, 2)), rng.uniform(1, 2, 5), scaling)
+    if kind == "many points":
+        return PointContacts(0.1 * rng.standard_normal((80, 2)), rng.uniform(1, 2, 80), scaling)
+    return Polynomial([1, 0, 0, 1 / 3, 0, 1, 0, 0, 0, 0, 2, 0, 1, 0, 3], scaling)
+
+
+def inverse_map(surface):
+    """The map that needs a search, from vectors (n, 3) to vectors (n, 3)."""
+    if surface.kind in ("dissipation", "point_contacts"):
+        return surface.twist_of_wrench
+    return surface.wrench_of_twist
+
+
+@pytest.mark.parametrize(
+    "kind", ["norms", "powers", "dissipation", "points", "many points", "polynomial"]
+)
+@settings(max_examples=4, deadline=None)
+@given(seed=st.integers(0, 10_000))
+def test_many_vectors_are_answered_as_few_are(kind, seed):
+    surface = surface_of(kind, seed)
+    rng = np.random.default_rng(seed)
+    vectors = rng.standard_normal((MANY, 3)) / [1.0, 1.0, 0.1]
+    # A surface that was asked for little has no table yet.
+    few = inverse_map(surface_of(kind, seed))(vectors[-FEW:])
+    many = inverse_map(surface)(vectors)[-FEW:]
+    np.testing.assert_allclose(many, few, atol=1e-9 * np.abs(few).max())
+
+
+@settings(max_examples=6, deadline=None)
+@given(seed=st.integers(0, 10_000))
+def test_the_twist_of_a_wrench_from_the_table_is_the_twist_asked_for(seed):
+    # Of full rank: at a corner a wrench has many twists.
+    surface = PowerSum.norms(matrices(np.random.default_rng(seed), 4))
+    twists = sampling.random_directions(MANY, seed)
+    wrenches = surface.wrench_of_twist(twists)
+    np.testing.assert_allclose(surface.load_factor(wrenches), 1.0, atol=1e-12)
+    back = surface.twist_of_wrench(wrenches)
+    assert np.linalg.norm(np.cross(twists, back), axis=1).max() < 1e-8
+
+
+def test_opposite_vectors_have_opposite_answers():
+    surface = surface_of("norms", 3)
+    twists = np.random.default_rng(0).standard_normal((MANY, 3))
+    twists[:100, 2] = 0.0
+    wrenches = surface.wrench_of_twist(twists)
+    np.testing.assert_allclose(surface.wrench_of_twist(-twists), -wrenches, atol=1e-9)
+
+
+def test_a_facet_gives_its_one_twist_to_all_of_its_loads():
+    surface = PointContacts([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]], [0.5, 0.5, 0.5])
+    facet = sampling.facet_loads(surface, MANY // 6, 0)
+    twists = surface.twist_of_wrench(facet.wrenches)
+    assert np.abs(twists - facet.twists).max() < 1e-9
+
+
+@pytest.mark.parametrize("size", [1e-60, 1e-20, 1e20, 1e60])
+def test_numbers_beyond_single_precision_are_solved_without_a_warning(size):
+    rng = np.random.default_rng(5)
+    usual = matrices(rng, 3)
+    twists = rng.standard_normal((MANY, 3))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        wrenches = PowerSum.norms(usual * size).wrench_of_twist(twists)
+    expected = PowerSum.norms(usual).wrench_of_twist(twists)
+    np.testing.assert_allclose(wrenches * np.sqrt(size), expected, rtol=1e-8, atol=1e-9)
+
+
+class Counted:
+    """An inverse that counts the vectors it is asked for."""
+
+    def __init__(self, inverse):
+        self.inverse = inverse
+        self.asked = 0
+
+    def solve(self, normals):
+        self.asked += normals.shape[1]
+        return self.inverse.solve(normals)
+
+    def starts_of_one(self, normal):
+        return self.inverse.starts_of_one(normal)
+
+
+def test_a_table_is_made_when_it_pays_and_spares_the_search():
+    tabulated = surface_of("powers", 1)._inverse._inverse
+    assert isinstance(tabulated, TabulatedInverse)
+    counted = Counted(tabulated._inverse)
+    inverse = TabulatedInverse(tabulated._gauge, counted)
+    vectors = np.random.default_rng(0).standard_normal((3, 1000))
+    inverse.solve(vectors)
+    assert counted.asked == 1000
+    for _ in range(20):
+        inverse.solve(vectors)
+    spent = counted.asked
+    for _ in range(10):
+        inverse.solve(vectors)
+    assert counted.asked - spent < 500
+
+
+def test_a_point_that_the_table_cannot_prove_is_not_certain():
+    surface = PointContacts([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]], [0.5, 0.5, 0.5])
+    inverse = surface._inverse_of_any
+    table = SupportTable(surface._terms, inverse)
+    loads = np.random.default_rng(0).standard_normal((3, 5000))
+    points, certain = table.points(loads)
+    exact = inverse.solve(loads)[0]
+    assert 0.01 < certain.mean() < 0.9
+    np.testing.assert_allclose(points[:, certain], exact[:, certain], rtol=1e-7, atol=1e-9)
