@@ -10,7 +10,7 @@ the table solves.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -126,40 +126,43 @@ class SupportTable:
 
     def _prove(self, place: Floats, cell: Places) -> tuple[Floats, Bools]:
         """Return points (3, m) for places (2, m) in the cells (m,), and which are certain (m,)."""
-        points, bends = self._read(place, cell)
-        points, _ = self._step(points, place, bends)
-        points, away = self._step(points, place, bends)
-        certain = away <= _LAST_STEP
+        points, local = self._read(place, cell)
+        points, _ = self._step(points, place, local)
+        points, away = self._step(points, place, local)
+        certain = _is_last(away)
         for _ in range(_STEPS - 2):
             todo = np.flatnonzero(~certain)
             if len(todo) == 0:
                 break
             points[:, todo], away = self._step(
-                *(each.take(todo, axis=1) for each in (points, place, bends))
+                *(each.take(todo, axis=1) for each in (points, place, local))
             )
-            certain[todo] = away <= _LAST_STEP
+            certain[todo] = _is_last(away)
         return points, certain
 
-    def _step(self, points: Floats, place: Floats, bends: Floats) -> tuple[Floats, Floats]:
-        """Return points (3, m) nearer to the right ones, and how far away these were (m,)."""
+    def _step(self, points: Floats, place: Floats, local: Floats) -> tuple[Floats, Floats]:
+        """Return points (3, m) nearer to the right ones, and the way there on the chart (2, m)."""
         gradient = self._gauge.gradient(points)
         points = points / (points * gradient).sum(axis=0)
         away = place - _chart(gradient)
         # Moves are short: the digits that single precision keeps of them are enough.
-        a, b = place.astype(np.float32)
+        a, b, lift, bend_aa, bend_ab, bend_bb = local
         da, db = away.astype(np.float32)
         z = points[2].astype(np.float32)
-        rise_a = bends[0] * da + bends[1] * db
-        rise_b = bends[1] * da + bends[2] * db
+        rise_a = bend_aa * da + bend_ab * db
+        rise_b = bend_ab * da + bend_bb * db
         rise = a * rise_a + b * rise_b + z * (a * da + b * db)
-        rise *= -2.0 / (1.0 + a * a + b * b)
+        rise *= -lift
         points[0] += rise_a + a * rise + z * da
         points[1] += rise_b + b * rise + z * db
         points[2] += rise
-        return points, np.abs(away).max(axis=0)
+        return points, away
 
     def _read(self, place: Floats, cell: Places) -> tuple[Floats, Floats]:
-        """Return points (3, m) and h_aa, h_ab, h_bb (3, m) at places (2, m) in the cells (m,)."""
+        """Return points (3, m) at places (2, m) in the cells (m,), and what is there (6, m).
+
+        That is a, b, 2 / (1 + a^2 + b^2), h_aa, h_ab and h_bb, in single precision.
+        """
         x, y = (
             (_CELLS * (at + 1.0) - (2 * index + 1)).astype(np.float32)
             for at, index in zip(place, np.divmod(cell, _CELLS), strict=True)
@@ -171,22 +174,25 @@ class SupportTable:
         slope = [_polynomial(each, y) for each in in_y]
         bend = [_polynomial(_derivative(each), y) for each in in_y[:-1]]
         in_x = _derivative(value)
-        height = _polynomial(value, x)
-        slope_a = _polynomial(in_x, x)
-        slope_b = _polynomial(slope, x)
+        local: Any = np.empty((6, len(cell)), dtype=np.float32)
+        local[:2] = a, b = place
+        lift = 2.0 / (1.0 + a * a + b * b)
+        local[2] = lift
+        local[3] = _polynomial(_derivative(in_x), x)
+        local[4] = _polynomial(_derivative(slope), x)
+        local[5] = _polynomial(bend, x)
+        local[3:] *= _CELLS**2
+        height, slope_a, slope_b = (_polynomial(each, x) for each in (value, in_x, slope))
         slope_a *= _CELLS
         slope_b *= _CELLS
-        bends = np.array(
-            [
-                _polynomial(_derivative(in_x), x),
-                _polynomial(_derivative(slope), x),
-                _polynomial(bend, x),
-            ]
-        )
-        bends *= _CELLS**2
-        a, b = place
-        z = 2.0 * (height - a * slope_a - b * slope_b) / (1.0 + a * a + b * b)
-        return np.array([slope_a + a * z, slope_b + b * z, z]), bends
+        z = lift * (height - a * slope_a - b * slope_b)
+        return np.array([slope_a + a * z, slope_b + b * z, z]), local
+
+
+def _is_last(away: Floats) -> Bools:
+    """Return whether a step of (2, m) on the chart was the last (m,)."""
+    da, db = away
+    return np.asarray((np.abs(da) <= _LAST_STEP) & (np.abs(db) <= _LAST_STEP))
 
 
 def _grid(ticks: Floats) -> Floats:
@@ -221,7 +227,8 @@ def _polynomial(coefficients: Sequence[Floats], x: Floats) -> Floats:
 
 def _derivative(coefficients: Sequence[Floats]) -> list[Floats]:
     """Return the coefficients of a polynomial's derivative."""
-    return [power * each for power, each in enumerate(coefficients)][1:]
+    _, first, *others = coefficients
+    return [first, *(power * each for power, each in enumerate(others, 2))]
 
 
 def _quintics(samples: Floats) -> Floats:
