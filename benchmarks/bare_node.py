@@ -13,6 +13,12 @@ from typing import Any
 import rclpy
 from geometry_msgs.msg import TwistStamped, WrenchStamped
 from limit_surface_interfaces.srv import (
+    EvaluateDecay,
+    ListDecays,
+    ListModels,
+    PredictStop,
+    Push,
+    TimeToLevel,
     TwistsToWrenches,
     TwistToWrench,
     WrenchesToTwists,
@@ -23,16 +29,24 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
 
+# Times in an answer of our decay node with its default parameters.
+STOP_POINTS = 201
+
+
 class BareNode(Node):
     """Answers everything with what was prepared, and relays wrenches as twists."""
 
     def __init__(self, name: str) -> None:
-        """Serve the four maps."""
+        """Serve all services of both nodes but reload, and one topic."""
         super().__init__(name)
         self._zeros: dict[int, array[float]] = {}
         for kind, service in (
             (WrenchToTwist, "wrench_to_twist"),
             (TwistToWrench, "twist_to_wrench"),
+            (Push, "push"),
+            (ListModels, "list_models"),
+            (TimeToLevel, "time_to_level"),
+            (ListDecays, "list_decays"),
         ):
             self.create_service(
                 kind,
@@ -42,6 +56,8 @@ class BareNode(Node):
             )
         self.create_service(WrenchesToTwists, "~/wrenches_to_twists", self._wrenches)
         self.create_service(TwistsToWrenches, "~/twists_to_wrenches", self._twists)
+        self.create_service(EvaluateDecay, "~/evaluate", self._values)
+        self.create_service(PredictStop, "~/predict_stop", self._stop)
         self._publisher = self.create_publisher(TwistStamped, "~/predicted_twist", 10)
         best_effort = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
         self.create_subscription(WrenchStamped, "~/wrench", self._relay, best_effort)
@@ -56,6 +72,14 @@ class BareNode(Node):
         count = len(request.twists)
         response.wrenches = self._prepared(count)
         response.powers = self._prepared(count // 3)
+        return response
+
+    def _values(self, request: Any, response: Any) -> Any:
+        response.values = self._prepared(len(request.times))
+        return response
+
+    def _stop(self, _: Any, response: Any) -> Any:
+        response.times = response.load_factors = self._prepared(STOP_POINTS)
         return response
 
     def _prepared(self, count: int) -> array[float]:

@@ -1,20 +1,27 @@
-"""Services and topics of the limit_surface node against a node with empty handlers.
+"""Services and topics of both nodes against a node with empty handlers of the same types.
 
 Usage: python benchmarks/bench_services.py
 
-Both nodes run in processes of their own, with the default executor; the calls alternate between
-them. Also measured: 1, 4 and 16 clients, the topic path, and processor time.
+The nodes run in processes of their own, with the default executor; the calls alternate between
+them. Also measured: 1, 4 and 16 clients, the topic path, and processor time. The lists are of
+unequal length: an empty handler lists nothing.
 """
 
 from __future__ import annotations
 
 import threading
 import time
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from geometry_msgs.msg import TwistStamped, WrenchStamped
 from limit_surface_interfaces.srv import (
+    EvaluateDecay,
+    ListDecays,
+    ListModels,
+    PredictStop,
+    Push,
+    TimeToLevel,
     TwistsToWrenches,
     TwistToWrench,
     WrenchesToTwists,
@@ -23,6 +30,7 @@ from limit_surface_interfaces.srv import (
 from node_processes import (
     BARE,
     OURS,
+    OURS_DECAY,
     isolate,
     process,
     processor_seconds,
@@ -39,6 +47,21 @@ BATCH_CALLS = 100
 ROWS = 10_000
 MESSAGES = 4000
 WINDOW = 5
+KINDS = {
+    kind.Request: kind
+    for kind in (
+        EvaluateDecay,
+        ListDecays,
+        ListModels,
+        PredictStop,
+        Push,
+        TimeToLevel,
+        TwistsToWrenches,
+        TwistToWrench,
+        WrenchesToTwists,
+        WrenchToTwist,
+    )
+}
 NODES = {"ours": "/limit_surface", "empty": "/bare"}
 
 
@@ -48,34 +71,87 @@ def quantiles(times: list[float]) -> tuple[float, float]:
     return float(p50), float(p99)
 
 
-def service_rows(client: ServiceClient) -> None:
-    """Print round trips of each service, alternating between the nodes."""
+def calls() -> list[Call]:
+    """Return one call of each service."""
     rng = np.random.default_rng(0)
     flat = convert.flat_of(rng.normal(size=(ROWS, 3)))
-    single = wrench_message([2.0, 1.0, 0.05])
+    times = convert.flat_of(np.linspace(0.0, 5.0, ROWS))
+    wrench = wrench_message([2.0, 1.0, 0.05])
     twist = TwistStamped()
     twist.header.frame_id = "object"
     twist.twist.linear.x, twist.twist.angular.z = 0.1, 1.0
-    work: list[tuple[str, Any, Any, int]] = [
-        ("wrench_to_twist", WrenchToTwist, WrenchToTwist.Request(wrench=single), SINGLE_CALLS),
-        ("twist_to_wrench", TwistToWrench, TwistToWrench.Request(twist=twist), SINGLE_CALLS),
-        ("wrenches_to_twists", WrenchesToTwists, WrenchesToTwists.Request(wrenches=flat), 0),
-        ("twists_to_wrenches", TwistsToWrenches, TwistsToWrenches.Request(twists=flat), 0),
+    push = Push.Request(friction=0.3)
+    push.contact.header.frame_id = "object"
+    push.contact.point.x, push.normal.x, push.velocity.x, push.velocity.y = -0.04, 1.0, 0.1, 0.02
+    one, many = SINGLE_CALLS, BATCH_CALLS
+    surface, decay = "/limit_surface", "/decay"
+    return [
+        Call(surface, "wrench_to_twist", WrenchToTwist.Request(wrench=wrench), 1, one, 1.15),
+        Call(surface, "twist_to_wrench", TwistToWrench.Request(twist=twist), 1, one, 1.15),
+        Call(surface, "push", push, 1, one, 1.15),
+        Call(
+            surface, "wrenches_to_twists", WrenchesToTwists.Request(wrenches=flat), ROWS, many, 2.5
+        ),
+        Call(
+            surface, "twists_to_wrenches", TwistsToWrenches.Request(twists=flat), ROWS, many, 2.5
+        ),
+        Call(surface, "list_models", ListModels.Request(), 0, one // 4, None),
+        Call(decay, "time_to_level", TimeToLevel.Request(level=0.1), 1, one, 1.15),
+        Call(decay, "predict_stop", PredictStop.Request(wrench=wrench), 1, one // 4, None),
+        Call(decay, "evaluate", EvaluateDecay.Request(times=times), ROWS, many, 2.5),
+        Call(decay, "list_models", ListDecays.Request(), 0, one // 4, None),
     ]
-    print("### Round trip between two processes\n")
-    print("| service | rows | ours p50 / p99 [ms] | empty handler p50 / p99 [ms] | ratio of p50 |")
-    print("|---|---|---|---|---|")
-    for name, kind, request, calls in work:
-        times: dict[str, list[float]] = {node: [] for node in NODES}
-        for turn in range(20 + (calls or BATCH_CALLS)):
-            for node, prefix in NODES.items():
-                elapsed = timed(client.call, kind, f"{prefix}/{name}", request)
+
+
+class Call(NamedTuple):
+    """A call of a service.
+
+    Attributes:
+        node: Of ours, whose service it is.
+        service: Name of the service.
+        request: What is asked.
+        rows: How many vectors or times go through.
+        repeats: How often it is called.
+        goal: Ratio to the empty handler that ours may reach; None if there is no goal.
+    """
+
+    node: str
+    service: str
+    request: Any
+    rows: int
+    repeats: int
+    goal: float | None
+
+    def times(self, client: ServiceClient) -> tuple[list[float], list[float]]:
+        """Return times [s] of ours and of the empty handler, called in turns."""
+        kind = KINDS[type(self.request)]
+        bare = "list_decays" if kind is ListDecays else self.service
+        names = f"{self.node}/{self.service}", f"/bare/{bare}"
+        found: tuple[list[float], list[float]] = [], []
+        for turn in range(20 + self.repeats):
+            for name, elapsed in zip(names, found, strict=True):
+                seconds = timed(client.call, kind, name, self.request)
                 if turn >= 20:
-                    times[node].append(elapsed)
-        ours, empty = quantiles(times["ours"]), quantiles(times["empty"])
+                    elapsed.append(seconds)
+        return found
+
+
+def service_rows(client: ServiceClient) -> None:
+    """Print round trips of each service."""
+    print("### Round trip between two processes\n")
+    print(
+        "| node | service | rows | ours p50 / p99 [ms] | empty handler p50 / p99 [ms] "
+        "| ratio of p50 | goal |"
+    )
+    print("|---|---|---|---|---|---|---|")
+    for call in calls():
+        times = call.times(client)
+        ours, empty = map(quantiles, times)
         print(
-            f"| `{name}` | {1 if calls else ROWS} | {ours[0]:.3f} / {ours[1]:.3f} "
-            f"| {empty[0]:.3f} / {empty[1]:.3f} | {ours[0] / empty[0]:.2f} |"
+            f"| {call.node[1:]} | `{call.service}` | {call.rows or ''} "
+            f"| {ours[0]:.3f} / {ours[1]:.3f} | {empty[0]:.3f} / {empty[1]:.3f} "
+            f"| {ours[0] / empty[0]:.2f} | {call.goal or ''} |",
+            flush=True,
         )
 
 
@@ -212,7 +288,12 @@ class TopicPath:
 def main() -> None:
     """Measure and print."""
     isolate()
-    with process(OURS) as ours, process(BARE) as bare, ServiceClient("bench") as client:
+    with (
+        process(OURS) as ours,
+        process(OURS_DECAY),
+        process(BARE) as bare,
+        ServiceClient("bench") as client,
+    ):
         service_rows(client)
         client_rows(client)
         topic_rows(client, {"ours": ours.pid, "empty": bare.pid})

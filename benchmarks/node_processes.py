@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 FOLDER = Path(__file__).parent
 OURS = [sys.executable, "-m", "limit_surface_ros.nodes.limit_surface_node"]
+OURS_DECAY = [sys.executable, "-m", "limit_surface_ros.nodes.decay_node"]
 BARE = [sys.executable, str(FOLDER / "bare_node.py"), "bare"]
 
 

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING
+from math import atan, atan2, cos, sin
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -24,9 +25,12 @@ if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.surface.protocol import LimitSurface
 
-# The direction of a sticking force is found among so many, in so many rounds of refinement.
-_DIRECTIONS = 65
-_ROUNDS = 7
+# Width [rad] of a bracket of force directions that is as good as one direction.
+_WIDTH = 1e-13
+# Error of direction [rad] of the velocity at the contact that counts as none.
+_EXACT = 1e-14
+# Every so many steps the bracket is halved, whatever the secant says.
+_HALVING = 4
 
 
 class ContactMode(str, Enum):
@@ -70,7 +74,7 @@ class MotionCone:
 
 
 def motion_cone(
-    surface: LimitSurface, point: ArrayLike, normal: ArrayLike, mu: float
+    surface: LimitSurface, point: ArrayLike, normal: ArrayLike, friction: float
 ) -> MotionCone:
     """Return the twists and contact velocities that bound what a pusher can cause.
 
@@ -78,18 +82,28 @@ def motion_cone(
         surface: Limit surface of the body.
         point: Contact point about the reference point [m], shape (2,).
         normal: Normal of the contact, pointing into the body, of any length, shape (2,).
-        mu: Friction coefficient between pusher and body, 0 or above.
+        friction: Coefficient of friction between pusher and body, 0 or above.
 
     Raises:
         ShapeError: The point or the normal is no pair of numbers.
         ZeroVectorError: The normal is zero.
         RangeError: The coefficient is negative or not finite.
     """
-    return _Contact(surface, point, normal, mu).cone()
+    contact = _Contact(surface, point, normal, friction)
+    edges = contact.edges()
+    return MotionCone(
+        np.array([contact.wrench(edge.angle) for edge in edges]),
+        np.array([edge.twist for edge in edges]),
+        np.array([edge.velocity for edge in edges]),
+    )
 
 
 def push(
-    surface: LimitSurface, point: ArrayLike, normal: ArrayLike, mu: float, velocity: ArrayLike
+    surface: LimitSurface,
+    point: ArrayLike,
+    normal: ArrayLike,
+    friction: float,
+    velocity: ArrayLike,
 ) -> Push:
     """Return how a body moves whose contact point is pushed with a velocity.
 
@@ -97,7 +111,7 @@ def push(
         surface: Limit surface of the body; it should be convex.
         point: Contact point about the reference point [m], shape (2,).
         normal: Normal of the contact, pointing into the body, of any length, shape (2,).
-        mu: Friction coefficient between pusher and body, 0 or above.
+        friction: Coefficient of friction between pusher and body, 0 or above.
         velocity: Of the pusher [m/s], shape (2,).
 
     Raises:
@@ -106,77 +120,110 @@ def push(
         ZeroVectorError: The normal is zero.
         RangeError: The coefficient is negative or not finite.
     """
-    contact = _Contact(surface, point, normal, mu)
+    contact = _Contact(surface, point, normal, friction)
     pushed = _pair("velocity", velocity)
     approach = float(pushed @ contact.normal)
     if approach <= 0.0:
         return Push(np.zeros(3), ContactMode.SEPARATE, np.zeros(3))
-    cone = contact.cone()
-    right, left = (contact.angle_of(edge) for edge in cone.velocities)
-    angle = contact.angle_of(pushed)
-    if right <= angle <= left:
-        return contact.stick(pushed, angle)
-    edge, mode = (1, ContactMode.SLIDE_LEFT) if angle > left else (0, ContactMode.SLIDE_RIGHT)
-    speed = approach / float(cone.velocities[edge] @ contact.normal)
-    return Push(speed * cone.twists[edge], mode, cone.wrenches[edge])
+    right, left = contact.edges()
+    heading = contact.angle_of(pushed)
+    if right.heading <= heading <= left.heading:
+        return contact.stick(pushed, (right, left), heading)
+    if heading > left.heading:
+        edge, mode = left, ContactMode.SLIDE_LEFT
+    else:
+        edge, mode = right, ContactMode.SLIDE_RIGHT
+    speed = approach / float(edge.velocity @ contact.normal)
+    return Push(speed * edge.twist, mode, contact.wrench(edge.angle))
+
+
+class _Response(NamedTuple):
+    """What a force causes: its angle, the twist, and velocity and heading at the contact."""
+
+    angle: float
+    twist: Floats
+    velocity: Floats
+    heading: float
 
 
 class _Contact:
     """A contact point with its friction cone; directions are angles from the inward normal."""
 
     def __init__(
-        self, surface: LimitSurface, point: ArrayLike, normal: ArrayLike, mu: float
+        self, surface: LimitSurface, point: ArrayLike, normal: ArrayLike, friction: float
     ) -> None:
         self._surface = surface
-        self._x, self._y = _pair("point", point)
+        self._x, self._y = _pair("point", point).tolist()
         direction = _pair("normal", normal)
         if not direction.any():
             raise ZeroVectorError("normal must not be zero: it has no direction")
-        if not 0.0 <= mu < float("inf"):
-            raise RangeError(f"mu must be a finite number from 0 on, got {mu}")
+        if not 0.0 <= friction < float("inf"):
+            raise RangeError(f"friction must be a finite number from 0 on, got {friction}")
         self.normal = direction / np.hypot(*direction)
-        self._half_angle = float(np.arctan(mu))
+        self._normal = self.normal.tolist()
+        self._half_angle = atan(friction)
 
-    def cone(self) -> MotionCone:
-        wrenches, twists, velocities = self._respond(np.array([-1.0, 1.0]) * self._half_angle)
-        return MotionCone(wrenches, twists, velocities)
+    def edges(self) -> tuple[_Response, _Response]:
+        """Return what the forces along the right and the left edge of the friction cone cause."""
+        return self._respond(-self._half_angle), self._respond(self._half_angle)
 
     def angle_of(self, vector: Floats) -> float:
         """Return the angle [rad] of a planar vector, counter-clockwise from the normal."""
-        nx, ny = self.normal
-        vx, vy = vector
-        return float(np.arctan2(nx * vy - ny * vx, nx * vx + ny * vy))
+        nx, ny = self._normal
+        vx, vy = vector.tolist()
+        return atan2(nx * vy - ny * vx, nx * vx + ny * vy)
 
-    def stick(self, velocity: Floats, angle: float) -> Push:
+    def stick(self, velocity: Floats, edges: tuple[_Response, _Response], heading: float) -> Push:
         """Find the force within the cone for which the body follows the pusher.
 
         The velocity that a force causes at the contact turns with the force, so that a bracket
-        of directions shrinks to the answer. Where the load is at a corner of the surface its
-        twists fill a cone: the answer is the sum of its edges that has the pusher's velocity.
+        of directions shrinks to the answer, by secants (Illinois) and halves. Where the load is
+        at a corner of the surface its twists fill a cone: the answer is the sum of its edges that
+        has the pusher's velocity.
         """
-        low, high = -self._half_angle, self._half_angle
-        for _ in range(_ROUNDS):
-            directions = np.linspace(low, high, _DIRECTIONS)
-            wrenches, twists, velocities = self._respond(directions)
-            below = [self.angle_of(each) <= angle for each in velocities]
-            last = min(
-                max((i for i, flag in enumerate(below) if flag), default=0), _DIRECTIONS - 2
-            )
-            low, high = directions[last], directions[last + 1]
-        ends = slice(last, last + 2)
-        shares = np.linalg.lstsq(velocities[ends].T, velocity, rcond=1e-9)[0]
-        return Push(shares @ twists[ends], ContactMode.STICK, wrenches[ends].mean(axis=0))
+        low, high = edges
+        below, above = low.heading - heading, high.heading - heading
+        step, side = 0, 0.0
+        while high.angle - low.angle > _WIDTH:
+            step += 1
+            secant = step % _HALVING and below < 0.0 < above
+            share = below / (below - above) if secant else 0.5
+            angle = low.angle + share * (high.angle - low.angle)
+            if not low.angle < angle < high.angle:
+                break
+            middle = self._respond(angle)
+            error = middle.heading - heading
+            if abs(error) <= _EXACT:
+                low = high = middle
+            elif error < 0.0:
+                # An end that stays for a second time counts half, so that the next secant moves it.
+                above *= 0.5 if side < 0.0 else 1.0
+                low, below, side = middle, error, error
+            else:
+                below *= 0.5 if side > 0.0 else 1.0
+                high, above, side = middle, error, error
+        velocities = np.array([low.velocity, high.velocity])
+        shares = np.linalg.lstsq(velocities.T, velocity, rcond=1e-9)[0]
+        twist = shares @ np.array([low.twist, high.twist])
+        return Push(twist, ContactMode.STICK, self.wrench(0.5 * (low.angle + high.angle)))
 
-    def _respond(self, angles: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return wrenches on the surface, twists and contact velocities for forces at angles."""
-        nx, ny = self.normal
-        cos, sin = np.cos(angles), np.sin(angles)
-        fx, fy = nx * cos - ny * sin, ny * cos + nx * sin
-        wrenches = np.stack([fx, fy, self._x * fy - self._y * fx], axis=1)
-        wrenches /= self._surface.load_factor(wrenches)[:, np.newaxis]
-        twists = self._surface.twist_of_wrench(wrenches)
-        vx, vy, omega = twists.T
-        return wrenches, twists, np.stack([vx - omega * self._y, vy + omega * self._x], axis=1)
+    def wrench(self, angle: float) -> Floats:
+        """Return the wrench on the surface (3,) of a force at an angle."""
+        load = self._load(angle)
+        return np.array(load) / self._surface.load_factor(load)
+
+    def _respond(self, angle: float) -> _Response:
+        twist = self._surface.twist_of_wrench(self._load(angle))
+        vx, vy, omega = twist.tolist()
+        velocity = np.array([vx - omega * self._y, vy + omega * self._x])
+        return _Response(angle, twist, velocity, self.angle_of(velocity))
+
+    def _load(self, angle: float) -> tuple[float, float, float]:
+        """Return the wrench of a unit force through the contact."""
+        nx, ny = self._normal
+        fx = nx * cos(angle) - ny * sin(angle)
+        fy = ny * cos(angle) + nx * sin(angle)
+        return fx, fy, self._x * fy - self._y * fx
 
 
 def _pair(name: str, values: ArrayLike) -> Floats:

@@ -98,8 +98,8 @@ def test_the_motion_cone_holds_the_sticking_velocities():
     [
         (([0, 0, 0], [1, 0], 0.3, [1, 0]), ShapeError, "point"),
         (([0, 0], [0, 0], 0.3, [1, 0]), ZeroVectorError, "normal"),
-        (([0, 0], [1, 0], -0.1, [1, 0]), RangeError, "mu"),
-        (([0, 0], [1, 0], float("nan"), [1, 0]), RangeError, "mu"),
+        (([0, 0], [1, 0], -0.1, [1, 0]), RangeError, "friction"),
+        (([0, 0], [1, 0], float("nan"), [1, 0]), RangeError, "friction"),
         (([0, 0], [1, 0], 0.3, [1]), ShapeError, "velocity"),
     ],
 )
