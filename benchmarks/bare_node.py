@@ -28,7 +28,6 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
-
 # Times in an answer of our decay node with its default parameters.
 STOP_POINTS = 201
 

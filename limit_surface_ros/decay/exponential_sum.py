@@ -15,6 +15,7 @@ import numpy as np
 
 from limit_surface_ros.checks import as_floats
 from limit_surface_ros.errors import NotFiniteError, RangeError, ShapeError, UnstableError
+from limit_surface_ros.root_bracket import root_bracket
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -303,6 +304,16 @@ class ExponentialSum:
             left, right = float(times[cell]), float(times[cell + 1])
             if width <= resolution or not left < 0.5 * (left + right) < right:
                 return right if values[cell] > level else left
+            if values[cell] > level >= values[cell + 1]:
+                slope = float((self.rates * np.exp(left * self.rates) @ self.coefficients).real)
+                # Steeper than the curvature can undo, x falls through the level once.
+                if abs(slope) > curvature[cell] * width:
+                    return root_bracket(
+                        lambda t: level - abs(float(self._at(np.array([t]))[0])),
+                        left,
+                        right,
+                        resolution,
+                    )[1]
             found = self._last_excess(left, right, level, resolution)
             if found is not None:
                 return found

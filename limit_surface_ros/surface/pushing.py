@@ -18,6 +18,7 @@ import numpy as np
 
 from limit_surface_ros.checks import as_floats
 from limit_surface_ros.errors import RangeError, ShapeError, ZeroVectorError
+from limit_surface_ros.root_bracket import root_bracket
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
 _WIDTH = 1e-13
 # Error of direction [rad] of the velocity at the contact that counts as none.
 _EXACT = 1e-14
-# Every so many steps the bracket is halved, whatever the secant says.
-_HALVING = 4
 
 
 class ContactMode(str, Enum):
@@ -177,31 +176,18 @@ class _Contact:
         """Find the force within the cone for which the body follows the pusher.
 
         The velocity that a force causes at the contact turns with the force, so that a bracket
-        of directions shrinks to the answer, by secants (Illinois) and halves. Where the load is
-        at a corner of the surface its twists fill a cone: the answer is the sum of its edges that
-        has the pusher's velocity.
+        of directions shrinks to the answer. Where the load is at a corner of the surface its
+        twists fill a cone: the answer is the sum of its edges that has the pusher's velocity.
         """
-        low, high = edges
-        below, above = low.heading - heading, high.heading - heading
-        step, side = 0, 0.0
-        while high.angle - low.angle > _WIDTH:
-            step += 1
-            secant = step % _HALVING and below < 0.0 < above
-            share = below / (below - above) if secant else 0.5
-            angle = low.angle + share * (high.angle - low.angle)
-            if not low.angle < angle < high.angle:
-                break
-            middle = self._respond(angle)
-            error = middle.heading - heading
-            if abs(error) <= _EXACT:
-                low = high = middle
-            elif error < 0.0:
-                # An end that stays for a second time counts half, so that the next secant moves it.
-                above *= 0.5 if side < 0.0 else 1.0
-                low, below, side = middle, error, error
-            else:
-                below *= 0.5 if side > 0.0 else 1.0
-                high, above, side = middle, error, error
+        right, left = edges
+        ends = root_bracket(
+            lambda angle: self._respond(angle).heading - heading,
+            right.angle,
+            left.angle,
+            _WIDTH,
+            _EXACT,
+        )
+        low, high = map(self._respond, ends)
         velocities = np.array([low.velocity, high.velocity])
         shares = np.linalg.lstsq(velocities.T, velocity, rcond=1e-9)[0]
         twist = shares @ np.array([low.twist, high.twist])

@@ -1,0 +1,53 @@
+"""The root of a rising function of one number, by secants and halves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+# Every so many steps the bracket is halved, whatever the secant says.
+_HALVING = 4
+
+
+def root_bracket(
+    function: Callable[[float], float], low: float, high: float, width: float, exact: float = 0.0
+) -> tuple[float, float]:
+    """Return a narrow bracket of the place where a function that never falls changes its sign.
+
+    The Illinois method (Dowell and Jarratt 1971, doi:10.1007/BF01934364) with halves in between,
+    so that jumps and flat parts are met as well.
+
+    Args:
+        function: Not above 0 at `low`, not below 0 at `high`.
+        low: Lower end.
+        high: Upper end.
+        width: Of a bracket that is narrow enough; 0 for the next number.
+        exact: Size of a value that counts as 0.
+
+    Returns:
+        Both ends; the same place twice if a value there counts as 0.
+    """
+    below, above = function(low), function(high)
+    step, side = 0, 0.0
+    while high - low > width:
+        step += 1
+        secant = step % _HALVING and below < 0.0 < above
+        place = low + (below / (below - above) if secant else 0.5) * (high - low)
+        if not low < place < high:
+            place = 0.5 * (low + high)
+            if not low < place < high:
+                break
+        value = function(place)
+        if abs(value) <= exact:
+            return place, place
+        # An end that stays for a second time counts half, so that the next secant moves it.
+        if value < 0.0:
+            above *= 0.5 if side < 0.0 else 1.0
+            low, below = place, value
+        else:
+            below *= 0.5 if side > 0.0 else 1.0
+            high, above = place, value
+        side = value
+    return low, high
