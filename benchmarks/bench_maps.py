@@ -1,7 +1,8 @@
-"""Speed of the maps, in batches and one at a time, against the peers in one run.
+"""Speed of the maps, alone and in batches, against the peers in one run.
 
-The peers are the closed form of the ellipsoid in plain numpy, which no model can beat, and
-scipy.optimize.root on the exact equations of support points, which is what users wrote before.
+The peers are the closed form of the ellipsoid in plain numpy, which no model can beat, the convex
+polynomial, and scipy.optimize.root on the exact equations of support points, which is what users
+wrote before. A plain C loop is the peer of `bench_maps_limits`.
 """
 
 from __future__ import annotations
@@ -25,8 +26,16 @@ from limit_surface_ros.surface.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 
 SCALING = Scaling(0.1, 5.0)
-BATCH = 200_000
-GOALS = {"thesis, 3 terms": (4.0, 20.0), "3 norms": (10.0, 8.0)}
+SIZES = (100, 1_000, 10_000, 100_000, 1_000_000)
+# Vectors after which a map that searches has made its table.
+TABLE = 10_000
+# Longest batch [s].
+PATIENCE = 1.5
+MAPS = {"wrench -> twist": "twist_of_wrench", "twist -> wrench": "wrench_of_twist"}
+GOALS = {
+    ("thesis, 3 terms", "wrench -> twist"): "20 us, 250 ns",
+    ("3 norms", "wrench -> twist"): "8 us, 100 ns",
+}
 
 
 def random_matrices(terms: int):
@@ -54,43 +63,52 @@ def kinds() -> dict[str, object]:
 def ellipsoid(matrix, loads):
     """Return the twists of an ellipsoid as anybody would write them."""
     twists = loads @ matrix
-    return twists / np.linalg.norm(twists, axis=1, keepdims=True)
+    return twists / np.linalg.norm(twists, axis=-1, keepdims=True)
 
 
-def batches_and_single_calls() -> None:
-    """Both maps of each kind; the slow ones with fewer vectors."""
-    print(f"### Both maps of each kind, one thread, batches of up to {BATCH}\n")
-    print(
-        "| kind | wrench -> twist [M/s] | goal | twist -> wrench [M/s] "
-        "| one wrench -> twist [us] | goal | one twist -> wrench [us] |"
-    )
-    print("|---|---|---|---|---|---|---|")
-    rng = np.random.default_rng(0)
+def ways() -> dict[tuple[str, str], object]:
+    """Return both maps of each kind, and the peer."""
+    found: dict[tuple[str, str], object] = {}
+    for map_name, method in MAPS.items():
+        for name, surface in kinds().items():
+            found[name, map_name] = getattr(surface, method)
     matrix = random_matrices(1)[0]
-    for name, surface in kinds().items():
-        loads = rng.standard_normal((BATCH, 3)) * SCALING.wrench_unit
-        twists = rng.standard_normal((BATCH, 3)) * SCALING.twist_unit
-        few = 2_000 if name in ("thesis, 3 terms", "thesis, 4 terms") else 20_000
-        slow = 20_000 if name in ("dissipation, 4 terms", "3 support points") else BATCH
-        one, other = loads[0].copy(), twists[0].copy()
-        times = interleaved(
-            {
-                "twists": lambda s=surface, f=loads[:slow]: s.twist_of_wrench(f),
-                "wrenches": lambda s=surface, v=twists[:few]: s.wrench_of_twist(v),
-                "twist": lambda s=surface, f=one: s.twist_of_wrench(f),
-                "wrench": lambda s=surface, v=other: s.wrench_of_twist(v),
-                "peer": lambda f=loads: ellipsoid(matrix, f),
-            },
-            rounds=5,
-        )
-        batch_goal, one_goal = GOALS.get(name, ("", ""))
+    found["peer: ellipsoid in plain numpy", next(iter(MAPS))] = lambda rows: ellipsoid(
+        matrix, rows
+    )
+    return found
+
+
+def times_by_size() -> None:
+    """Time of one vector alone and in batches, for both maps of each kind."""
+    print("### Time for a vector, alone and in batches\n")
+    print(
+        f"One thread. Batches that would take more than {PATIENCE:g} s are left out. The maps "
+        "that have to search keep a table once they were asked for much; it is there already.\n"
+    )
+    print(f"| kind | map | alone [us] | {' | '.join(f'{n:.0e} [ns]' for n in SIZES)} | goals |")
+    print(f"|---|---|---|{'---|' * len(SIZES)}---|")
+    rng = np.random.default_rng(0)
+    rows = rng.standard_normal((SIZES[-1], 3)) * [1.0, 1.0, 0.1]
+    for (name, map_name), call in ways().items():
+        call(rows[:TABLE])
+        one = rows[0].copy()
+        alone = interleaved({"one": lambda c=call, r=one: c(r)})["one"]
+        cells, each = [], alone
+        for size in SIZES:
+            if each * size > PATIENCE:
+                cells.append("")
+                continue
+            batch = rows[:size]
+            rounds = 9 if size < SIZES[-1] else 3
+            each = interleaved({"all": lambda c=call, r=batch: c(r)}, rounds)["all"] / size
+            cells.append(f"{each * 1e9:.3g}")
+        goal = GOALS.get((name, map_name), "")
         print(
-            f"| {name} | {slow / times['twists'] / 1e6:.3g} | {batch_goal} "
-            f"| {few / times['wrenches'] / 1e6:.3g} | {times['twist'] * 1e6:.1f} | {one_goal} "
-            f"| {times['wrench'] * 1e6:.1f} |",
+            f"| {name} | {map_name} | {alone * 1e6:.3g} | {' | '.join(cells)} | {goal} |",
             flush=True,
         )
-    print(f"\nThe peer, an ellipsoid in plain numpy: {BATCH / times['peer'] / 1e6:.1f} M/s.\n")
+    print()
 
 
 def patch_against_root() -> None:
@@ -131,7 +149,7 @@ def patch_against_root() -> None:
 
 def main() -> int:
     """Print the tables."""
-    batches_and_single_calls()
+    times_by_size()
     patch_against_root()
     return 0
 

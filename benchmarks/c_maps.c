@@ -1,7 +1,7 @@
-/* The map from wrench to twist as a plain loop: what compiled code could reach at best.
+/* The maps in closed form as plain loops: what compiled code could reach at best.
  *
- * The same formulas as limit_surface_ros.surface.power_sum, one load after the other. roots holds
- * k factors R_i (3 x 3, row by row) with A_i = R_i' R_i; in and out hold n rows of 3.
+ * The same formulas as limit_surface_ros.surface, one vector after the other. roots holds k
+ * factors R_i (3 x 3, row by row) with A_i = R_i' R_i; in and out hold n rows of 3.
  */
 #include <math.h>
 #include <stddef.h>
@@ -86,6 +86,41 @@ void norm_sum_twists(const double *roots, int terms, const double *wrench_unit,
             if (form > 0.0)
                 add_pull(roots + 9 * term, image, 1.0 / sqrt(form), normal);
         }
+        write_twist(normal, twist_unit, out);
+    }
+}
+
+/* D(v) = sum_k sqrt(v' B_k v): the load is its gradient. */
+void norm_sum_wrenches(const double *roots, int terms, const double *twist_unit,
+    const double *wrench_unit, const double *in, double *out, size_t n)
+{
+    for (size_t i = 0; i < n; i++, in += 3, out += 3) {
+        double twist[3], image[3], load[3] = {0.0, 0.0, 0.0};
+        scale_load(in, twist_unit, twist);
+        for (int term = 0; term < terms; term++) {
+            double form = image_of(roots + 9 * term, twist, image);
+            if (form > 0.0)
+                add_pull(roots + 9 * term, image, 1.0 / sqrt(form), load);
+        }
+        for (int column = 0; column < 3; column++)
+            out[column] = load[column] * wrench_unit[column];
+    }
+}
+
+/* P(f) of fourth order; second holds its second derivatives as 9 quadratics of 6 coefficients. */
+void quartic_twists(const double *second, const double *wrench_unit, const double *twist_unit,
+    const double *in, double *out, size_t n)
+{
+    for (size_t i = 0; i < n; i++, in += 3, out += 3) {
+        double f[3], normal[3] = {0.0, 0.0, 0.0};
+        scale_load(in, wrench_unit, f);
+        double squares[6] = {f[0] * f[0], f[0] * f[1], f[0] * f[2], f[1] * f[1], f[1] * f[2],
+            f[2] * f[2]};
+        for (int row = 0; row < 3; row++)
+            for (int column = 0; column < 3; column++)
+                for (int square = 0; square < 6; square++)
+                    normal[row] += second[18 * row + 6 * column + square] * squares[square]
+                        * f[column];
         write_twist(normal, twist_unit, out);
     }
 }

@@ -9,15 +9,19 @@ import shutil
 import subprocess
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from limit_surface_ros.surface.polynomial import Polynomial
+from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.quadratic_form import root_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.power_sum import PowerSum
+    from limit_surface_ros.surface.protocol import LimitSurface
 
 SOURCE = Path(__file__).with_name("c_maps.c")
 FLAGS = ["-O3", "-march=native", "-shared", "-fPIC"]
@@ -47,25 +51,39 @@ def compiled() -> ctypes.CDLL | None:
         return ctypes.CDLL(str(library))
 
 
-def twists_in_c(library: ctypes.CDLL, surface: PowerSum) -> Callable[[Floats], Floats]:
-    """Return the surface's twist_of_wrench for contiguous rows (n, 3), as a loop in C."""
-    roots = np.ascontiguousarray(surface._roots)
-    powers = np.ascontiguousarray(surface.exponents)
-    wrench_unit = np.ascontiguousarray(surface.scaling.wrench_unit)
-    twist_unit = np.ascontiguousarray(surface.scaling.twist_unit)
-    terms = ctypes.c_int(len(powers))
+def map_in_c(
+    library: ctypes.CDLL, surface: LimitSurface
+) -> tuple[str, Callable[[Floats], Floats]]:
+    """Return the name of the surface's map in closed form, and that map as a loop in C.
+
+    It takes contiguous rows (n, 3).
+    """
+    wrench_unit, twist_unit = surface.scaling.wrench_unit, surface.scaling.twist_unit
+    if isinstance(surface, PowerSum):
+        roots, powers = surface._roots, surface.exponents
+        constants = [roots, len(powers), wrench_unit, twist_unit]
+        if (powers == 0.5).all():
+            return "twist_of_wrench", _loop(library.norm_sum_twists, constants)
+        return "twist_of_wrench", _loop(library.power_sum_twists, [roots, powers, *constants[1:]])
+    if isinstance(surface, Polynomial):
+        constants = [surface._second, wrench_unit, twist_unit]
+        return "twist_of_wrench", _loop(library.quartic_twists, constants)
+    roots = np.array([root_of(form) for form in surface.scaled_forms])
+    constants = [roots, len(roots), twist_unit, wrench_unit]
+    return "wrench_of_twist", _loop(library.norm_sum_wrenches, constants)
+
+
+def _loop(function: Any, constants: list[Any]) -> Callable[[Floats], Floats]:
+    """Return a loop in C with its constants, arrays or whole numbers, as a map of rows."""
+    kept = [each if isinstance(each, int) else np.ascontiguousarray(each) for each in constants]
 
     def address(array: Floats) -> ctypes.c_void_p:
         return ctypes.c_void_p(array.ctypes.data)
 
-    def twists(rows: Floats) -> Floats:
+    def mapped(rows: Floats) -> Floats:
         out = np.empty_like(rows)
-        data = address(wrench_unit), address(twist_unit), address(rows), address(out)
-        count = ctypes.c_size_t(len(rows))
-        if (powers == 0.5).all():
-            library.norm_sum_twists(address(roots), terms, *data, count)
-        else:
-            library.power_sum_twists(address(roots), address(powers), terms, *data, count)
+        given = [ctypes.c_int(each) if isinstance(each, int) else address(each) for each in kept]
+        function(*given, address(rows), address(out), ctypes.c_size_t(len(rows)))
         return out
 
-    return twists
+    return mapped

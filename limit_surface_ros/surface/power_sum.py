@@ -215,7 +215,8 @@ class PowerSum(ScaledSurface):
     def _twists(self, loads: Floats) -> Floats:
         images = self._images(loads)
         forms = self._forms(images, loads)
-        if not forms.any(axis=0).all():
+        seen = forms.all()
+        if not seen and not forms.any(axis=0).all():
             unlimited = loads[:, ~forms.any(axis=0)][:, 0].tolist()
             raise RangeError(
                 "this surface has no limit in the direction of a wrench: friction resists any "
@@ -227,8 +228,9 @@ class PowerSum(ScaledSurface):
             shares = scale_and_shares(forms, self.exponents)[1]
             shares *= self.exponents[:, np.newaxis]
             weights = np.divide(forms, shares, out=np.zeros_like(forms), where=shares > 0.0)
-        # A term that does not see the load adds nothing to its normal.
-        weights[weights == 0.0] = np.inf
+        if not (seen and self._is_norm):
+            # A term that does not see the load adds nothing to its normal.
+            weights[weights == 0.0] = np.inf
         images /= weights[:, np.newaxis]
         gradient = self._stacked_roots.T @ images.reshape(-1, images.shape[2])
         if not self._is_norm:

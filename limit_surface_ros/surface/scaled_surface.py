@@ -191,7 +191,9 @@ class ScaledSurface(ABC):
         for start in range(0, len(rows), count):
             block = slice(start, start + count)
             columns = np.divide(rows[block].T, 1.0, order="C")
-            sizes = np.abs(columns).max(axis=0)
-            columns /= np.where(sizes > 0.0, sizes, 1.0)
+            sizes = np.maximum.reduce(np.abs(columns))
+            if not sizes.all():
+                sizes[sizes == 0.0] = 1.0
+            columns /= sizes
             columns /= unit[:, np.newaxis]
             yield block, columns, sizes
