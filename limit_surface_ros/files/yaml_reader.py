@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import os
+import reprlib
 import stat
 import tempfile
 from pathlib import Path
@@ -27,10 +28,13 @@ if TYPE_CHECKING:
 # No model is larger: a matrix takes some 200 bytes.
 MAX_BYTES = 16 * 2**20
 MAX_DEPTH = 100
+_TOO_DEEP = f"is nested deeper than {MAX_DEPTH} levels"
 # Characters up to which a text cannot be nested deep enough to do harm.
 SHALLOW_LENGTH = 10_000
 
 _REQUIRED: Any = object()
+# What a message shows of a value, which may be of any depth and length.
+_shown = reprlib.repr
 # libyaml reads about ten times as fast and is there on every common platform.
 _SafeLoader: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
@@ -48,6 +52,25 @@ class _Loader(_SafeLoader):  # type: ignore[misc, valid-type]
                 )
         mapping: dict[Any, Any] = super().construct_mapping(node, deep)
         return mapping
+
+    def construct_decimal(self, node: yaml.ScalarNode) -> float:
+        """Build a number; refuse 1:30 and 010, of base 60 and 8 in YAML 1.1."""
+        whole = node.tag.endswith(":int")
+        digits = node.value.lstrip("+-")
+        octal = whole and digits[0] == "0" and digits[1:2].isdigit()
+        if octal or ":" in digits:
+            base = 8 if octal else 60
+            raise yaml.MarkedYAMLError(
+                problem=f"{node.value} is of base {base} in YAML 1.1; write a decimal number, "
+                "or a text in quotes",
+                problem_mark=node.start_mark,
+            )
+        number: float = (self.construct_yaml_int if whole else self.construct_yaml_float)(node)
+        return number
+
+
+for _kind in ("int", "float"):
+    _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _Loader.construct_decimal)
 
 
 class _Dumper(yaml.SafeDumper):
@@ -101,7 +124,7 @@ class Section:
         if value is default:
             return default
         if not isinstance(value, str) or not value.strip():
-            raise self.error(key, f"must be a text that is not empty, got {value!r}")
+            raise self.error(key, f"must be a text that is not empty, got {_shown(value)}")
         return value
 
     def choice(self, key: str, accepted: Collection[Any], default: Any = _REQUIRED) -> Any:
@@ -110,7 +133,7 @@ class Section:
         # True == 1 in Python, but a schema of `true` is a mistake.
         if value not in accepted or isinstance(value, bool):
             listed = ", ".join(str(option) for option in accepted)
-            raise self.error(key, f"must be one of {listed}; got {value!r}")
+            raise self.error(key, f"must be one of {listed}; got {_shown(value)}")
         return value
 
     def number(
@@ -140,7 +163,9 @@ class Section:
         if value is default:
             return default
         if isinstance(value, bool) or not isinstance(value, int) or value < at_least:
-            raise self.error(key, f"must be a whole number from {at_least} on, got {value!r}")
+            raise self.error(
+                key, f"must be a whole number from {at_least} on, got {_shown(value)}"
+            )
         return value
 
     def array(self, key: str, shape: tuple[int | None, ...], default: Any = _REQUIRED) -> Any:
@@ -152,7 +177,7 @@ class Section:
         value = self._get(key, default)
         if value is default:
             return default
-        array = self._numbers(key, value)
+        array = self._numbers(key, value, len(shape) + 1)
         fits = array.ndim == len(shape) and all(
             given > 0 if wanted is None else given == wanted
             for given, wanted in zip(array.shape, shape, strict=True)
@@ -167,17 +192,17 @@ class Section:
         """Return the mapping under a key."""
         value = self._get(key, default)
         if not isinstance(value, dict):
-            raise self.error(key, f"must be a mapping of keys to values, got {value!r}")
+            raise self.error(key, f"must be a mapping of keys to values, got {_shown(value)}")
         return Section(self.path, value, f"{self._prefix}{key}.")
 
     def sections(self, key: str) -> list[Section]:
         """Return the mappings in the list under a key."""
         value = self._get(key, _REQUIRED)
         if not isinstance(value, list) or not value:
-            raise self.error(key, f"must be a list of mappings, got {value!r}")
+            raise self.error(key, f"must be a list of mappings, got {_shown(value)}")
         for i, item in enumerate(value):
             if not isinstance(item, dict):
-                raise self.error(f"{key}[{i}]", f"must be a mapping, got {item!r}")
+                raise self.error(f"{key}[{i}]", f"must be a mapping, got {_shown(item)}")
         return [
             Section(self.path, item, f"{self._prefix}{key}[{i}].") for i, item in enumerate(value)
         ]
@@ -197,9 +222,12 @@ class Section:
             accepted = ", ".join(self._known)
             raise self.error(str(unknown[0]), f"is not known here; accepted are {accepted}")
 
-    def _numbers(self, key: str, value: Any) -> Floats:
-        if isinstance(value, list):
-            parts = [self._numbers(f"{key}[{i}]", item) for i, item in enumerate(value)]
+    def _numbers(self, key: str, value: Any, levels: int) -> Floats:
+        """Return nested lists of numbers as an array; deeper than `levels` they are no numbers."""
+        if levels and isinstance(value, list):
+            parts = [
+                self._numbers(f"{key}[{i}]", item, levels - 1) for i, item in enumerate(value)
+            ]
             if len({part.shape for part in parts}) > 1:
                 raise self.error(key, "its rows must have one length")
             return np.array(parts)
@@ -216,7 +244,7 @@ class Section:
                     key, f"{value!r} is text in YAML 1.1; write it as the number {number!r}"
                 )
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise self.error(key, f"must be a number, got {value!r}")
+            raise self.error(key, f"must be a number, got {_shown(value)}")
         try:
             number = float(value)
         except OverflowError:
@@ -240,16 +268,26 @@ def _text_of(path: Path) -> str:
     return path.read_text(encoding="utf-8")
 
 
-def _check_depth(path: Path, text: str) -> None:
+def _check_depth(text: str) -> None:
     """Refuse what is nested so deep that building it would overflow the C stack of libyaml."""
     depth = 0
     for event in yaml.parse(text, Loader=_SafeLoader):
         if isinstance(event, yaml.CollectionStartEvent):
             depth += 1
             if depth > MAX_DEPTH:
-                raise FileError(f"{path}: is nested deeper than {MAX_DEPTH} levels")
+                raise yaml.MarkedYAMLError(problem=_TOO_DEEP)
         elif isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
+
+
+def _told(error: yaml.MarkedYAMLError) -> str:
+    """Return what is wrong and where."""
+    # libyaml has a limit of its own since PyYAML 6.0.4, and may meet it first: it looks ahead.
+    if "nesting depth" in str(error.problem):
+        return _TOO_DEEP
+    mark = error.problem_mark
+    where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
+    return f"{where}{error.problem or error}"
 
 
 def read_yaml(path: str | Path) -> Section:
@@ -267,13 +305,11 @@ def read_yaml(path: str | Path) -> Section:
         raise FileError(f"{path}: is not UTF-8 text: {error}") from None
     try:
         if len(text) > SHALLOW_LENGTH:
-            _check_depth(path, text)
+            _check_depth(text)
         # _Loader is a safe loader: it builds plain Python values only.
         values = yaml.load(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark
-        where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
-        raise FileError(f"{path}: {where}{error.problem or error}") from None
+        raise FileError(f"{path}: {_told(error)}") from None
     except (yaml.YAMLError, ValueError) as error:
         raise FileError(f"{path}: is not YAML: {error}") from None
     if not isinstance(values, dict):

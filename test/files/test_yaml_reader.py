@@ -87,8 +87,40 @@ def test_a_file_that_cannot_be_read_is_refused_with_its_name(tmp_path):
 
 def test_a_text_nested_too_deep_for_the_stack_is_refused(section_of):
     for text in ("[" * 40_000, "- " * 40_000, "a: " + "{b: " * 40_000):
-        with pytest.raises(FileError, match="is nested deeper than 100 levels"):
+        with pytest.raises(FileError, match=r"model\.yaml: is nested deeper than 100 levels$"):
             section_of(text)
+
+
+@pytest.mark.parametrize("depth", [50, 900, 3000])
+def test_a_number_or_array_nested_however_deep_is_refused_in_few_words(section_of, depth):
+    for text in ("[" * depth + "1" + "]" * depth, "{b: " * depth + "1" + "}" * depth):
+        for read in (lambda s: s.array("a", (None, 2)), lambda s: s.number("a")):
+            with pytest.raises(FileError, match=r"a(\[0\])*: must be|nested deeper") as caught:
+                read(section_of(f"a: {text}"))
+            assert len(str(caught.value)) < 300
+
+
+def test_anchors_that_repeat_each_other_cost_no_memory(section_of):
+    laughs = ["&x0 [1, 1]", *(f"&x{i} [{', '.join([f'*x{i - 1}'] * 9)}]" for i in range(1, 30))]
+    section = section_of("\n".join(f"a{i}: {laugh}" for i, laugh in enumerate(laughs)))
+    with pytest.raises(FileError, match=r"a29\[0\]\[0\]\[0\]: must be a number"):
+        section.array("a29", (None, 2))
+
+
+@pytest.mark.parametrize("number", ["1:30", "-1:30", "190:20:30.5", "010", "-017"])
+def test_what_yaml_takes_for_a_number_of_base_60_or_8_is_refused_with_its_place(
+    section_of, number
+):
+    with pytest.raises(FileError, match=rf"line 2, column 4: {number} is of base (60|8)"):
+        section_of(f"y: 1\nx: {number}")
+    assert section_of(f"x: '{number}'").text("x") == number
+
+
+@pytest.mark.parametrize(
+    ("text", "number"), [("0", 0), ("-0.5", -0.5), ("1_000", 1000), ("00.5", 0.5), (".5", 0.5)]
+)
+def test_other_numbers_are_read_as_they_stand(section_of, text, number):
+    assert section_of(f"x: {text}").number("x") == number
 
 
 def test_what_is_no_regular_file_or_too_large_is_neither_read_nor_replaced(tmp_path):
