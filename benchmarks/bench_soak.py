@@ -2,152 +2,134 @@
 
 Usage: python benchmarks/bench_soak.py [SECONDS]
 
-1 kHz of wrenches of which 1 % are bad, four clients that check every answer against the library,
-and a reload each second. The exit code is 1 if an answer was lost or wrong.
+1 kHz of wrenches of which 1 % are bad, four clients whose answers are checked against the
+library, and a reload each second. Then the topic path under two loads and with both executors,
+beside a node with empty handlers: what is late there, too, is not late because of ours. The exit
+code is 1 if an answer was lost or wrong.
 """
 
 from __future__ import annotations
 
-import math
+import contextlib
+import multiprocessing
 import sys
-import threading
 import time
-from dataclasses import dataclass, field
-from typing import Any
+from concurrent.futures import ProcessPoolExecutor
+from typing import TYPE_CHECKING
 
 import numpy as np
+import soak_load
 from ament_index_python.packages import get_package_share_directory
-from geometry_msgs.msg import TwistStamped, WrenchStamped
-from limit_surface_interfaces.srv import WrenchToTwist
-from node_processes import OURS, isolate, process, resident, wrench_message
-from std_srvs.srv import Trigger
+from node_processes import BARE, OURS, isolate, process, processor_seconds, resident
 
-from limit_surface_ros.files.surface_file import SurfaceModel, read_surface_model
-from limit_surface_ros.nodes.service_client import ServiceClient
+if TYPE_CHECKING:
+    import subprocess
+    from collections.abc import Sequence
 
 SECONDS = 30.0
 WARM_UP = 5.0
-RATE = 1000.0
+# Of each row of the second table.
+ROW_SECONDS = 8.0
 CLIENTS = 4
 MODEL = "triangle_patch"
-PREFIX = "/limit_surface"
+# Time from one call of a client to the next [s]; 0: as soon as it was answered.
+LOADS = {"4 clients in closed loops": 0.0, "4 clients at 50 calls/s each": 0.02}
 
 
-@dataclass
-class Tally:
-    """What was seen."""
+class Load:
+    """Processes that load a node.
 
-    calls: int = 0
-    lost: int = 0
-    wrong: int = 0
-    sent: int = 0
-    bad: int = 0
-    reloads: int = 0
-    due: dict[tuple[int, int], float] = field(default_factory=dict)
-    delays: list[float] = field(default_factory=list)
+    Args:
+        model_file: What our node answers by.
+    """
 
+    def __init__(self, model_file: str) -> None:
+        """Start them."""
+        self._pool = ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn"))
+        self._model_file = model_file
 
-def ask(tally: Tally, model: SurfaceModel, seed: int, end: float) -> None:
-    """Call until the end and check each answer."""
-    rng = np.random.default_rng(seed)
-    with ServiceClient(f"soak_client_{seed}") as client:
-        while time.perf_counter() < end:
-            wrench = rng.normal(size=3) * [2.0, 2.0, 0.1]
-            request = WrenchToTwist.Request(
-                model=model.name, wrench=wrench_message(wrench, model.frame_id)
-            )
-            try:
-                answer = client.call(WrenchToTwist, f"{PREFIX}/wrench_to_twist", request)
-            except TimeoutError:
-                tally.lost += 1
-                continue
-            tally.calls += 1
-            found = answer.twist.twist
-            twist = [found.linear.x, found.linear.y, found.angular.z]
-            expected = model.surface.twist_of_wrench(wrench)
-            factor = float(model.surface.load_factor(wrench))
-            right = np.allclose(twist, expected, rtol=1e-9, atol=1e-9)
-            if not right or not math.isclose(answer.load_factor, factor, rel_tol=1e-9):
-                tally.wrong += 1
+    def run(
+        self, prefix: str, node: subprocess.Popen[bytes], period: float, seconds: float
+    ) -> tuple[soak_load.Stream, soak_load.Calls, float, tuple[int, int]]:
+        """Load a node.
 
-
-def reload(tally: Tally, end: float) -> None:
-    """Reload the models once a second."""
-    with ServiceClient("soak_reloader") as client:
-        while time.perf_counter() < end:
-            answer = client.call(Trigger, f"{PREFIX}/reload", Trigger.Request())
-            tally.reloads += answer.success
-            time.sleep(1.0)
+        Returns:
+            What became of wrenches and calls, the share of a core that the node used, and its
+            resident memory [kB] after warming up and at the end.
+        """
+        ours = prefix != "/bare"
+        calls = self._pool.submit(
+            soak_load.call, prefix, seconds, period, CLIENTS, self._model_file if ours else None
+        )
+        stream = self._pool.submit(soak_load.stream, prefix, seconds)
+        warm_up = min(WARM_UP, seconds / 4)
+        time.sleep(warm_up)
+        start, used, before = time.perf_counter(), processor_seconds(node.pid), resident(node.pid)
+        seen = stream.result()
+        share = (processor_seconds(node.pid) - used) / (time.perf_counter() - start)
+        memory = before, resident(node.pid)
+        # What is first sent meets a node that is still being discovered.
+        seen.delays = seen.delays[int(len(seen.delays) * warm_up / seconds) :]
+        return seen, calls.result(), share, memory
 
 
-def stream(tally: Tally, publisher: Any, frame: str, end: float) -> None:
-    """Publish wrenches at a steady rate, one in a hundred of them bad."""
-    due = time.perf_counter()
-    while due < end:
-        time.sleep(max(0.0, due - time.perf_counter()))
-        number, due = tally.sent, due + 1.0 / RATE
-        message = wrench_message([2.0, 1.0, 0.05], frame)
-        message.header.stamp.sec, message.header.stamp.nanosec = divmod(number, 1000)
-        tally.sent += 1
-        if number % 100 == 99:
-            message.wrench.force.x = math.nan
-            tally.bad += 1
-        else:
-            tally.due[number // 1000, number % 1000] = time.perf_counter()
-        publisher.publish(message)
+def milliseconds(times: Sequence[float]) -> str:
+    """Return p50 / p99 of times [s] in [ms]."""
+    p50, p99 = np.quantile(np.array(times) * 1e3, [0.5, 0.99])
+    return f"{p50:.2f} / {p99:.2f}"
+
+
+def soak(load: Load, prefix: str, node: subprocess.Popen[bytes], seconds: float) -> bool:
+    """Print the long soak; return whether every answer came and was right."""
+    stream, calls, _, (before, after) = load.run(prefix, node, 0.0, WARM_UP + seconds)
+    alive = node.poll() is None
+    print(f"### {seconds:g} s after {WARM_UP:g} s of warming up, clients in closed loops\n")
+    print("| what | seen | goal |")
+    print("|---|---|---|")
+    print(f"| service calls answered | {len(calls.times)} | |")
+    print(f"| answers lost | {calls.lost} | 0 |")
+    print(f"| answers that differ from the library | {calls.wrong} | 0 |")
+    print(f"| reloads | {calls.reloads} | |")
+    print(f"| good wrenches sent / answered | {stream.sent} / {stream.answered} | |")
+    print(f"| bad wrenches sent / answered | {stream.bad} / {stream.unasked} | 0 answered |")
+    print(f"| topic path p50 / p99 [ms] | {milliseconds(stream.delays)} | p99 < 5 |")
+    print(f"| resident memory [MB] | {before / 1e3:.1f} -> {after / 1e3:.1f} ", end="")
+    print(f"({(after / before - 1) * 100:+.2f} %) | < 1 % |")
+    return alive and not (calls.lost or calls.wrong or stream.unasked)
 
 
 def main() -> int:
-    """Load the node and print what became of it."""
+    """Load the nodes and print what became of it."""
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else SECONDS
     isolate()
     share = get_package_share_directory("limit_surface_ros")
-    model = read_surface_model(f"{share}/config/models/{MODEL}.yaml")
-    tally = Tally()
-    command = [*OURS, "--ros-args", "-p", f"default_model:={MODEL}"]
-    with process(command) as node, ServiceClient("soak") as client:
-
-        def take(message: TwistStamped) -> None:
-            stamp = message.header.stamp
-            tally.delays.append(time.perf_counter() - tally.due.pop((stamp.sec, stamp.nanosec)))
-
-        client.node.create_subscription(TwistStamped, f"{PREFIX}/predicted_twist", take, 100)
-        publisher = client.node.create_publisher(WrenchStamped, f"{PREFIX}/wrench", 100)
-        client.call(Trigger, f"{PREFIX}/reload", Trigger.Request())
-        while not publisher.get_subscription_count():
-            time.sleep(0.01)
-        end = time.perf_counter() + WARM_UP + seconds
-        threads = [
-            threading.Thread(target=ask, args=(tally, model, seed, end)) for seed in range(CLIENTS)
-        ]
-        threads.append(threading.Thread(target=reload, args=(tally, end)))
-        threads.append(
-            threading.Thread(target=stream, args=(tally, publisher, model.frame_id, end))
-        )
-        for thread in threads:
-            thread.start()
-        time.sleep(WARM_UP)
-        before, skipped = resident(node.pid), len(tally.delays)
-        for thread in threads:
-            thread.join()
-        after = resident(node.pid)
-        alive = node.poll() is None
-    delays = np.array(tally.delays[skipped:]) * 1e3
-    good = tally.sent - tally.bad
-    print(f"### {seconds:g} s after {WARM_UP:g} s of warming up\n")
-    print("| what | seen | goal |")
-    print("|---|---|---|")
-    print(f"| service calls answered | {tally.calls} | |")
-    print(f"| answers lost | {tally.lost} | 0 |")
-    print(f"| answers that differ from the library | {tally.wrong} | 0 |")
-    print(f"| reloads | {tally.reloads} | |")
-    print(f"| good wrenches sent / answered | {good} / {len(tally.delays)} | |")
-    print(f"| bad wrenches sent | {tally.bad} | |")
-    print(f"| topic path p50 / p99 [ms] | {np.median(delays):.2f} / ", end="")
-    print(f"{np.quantile(delays, 0.99):.2f} | p99 < 5 |")
-    print(f"| resident memory [MB] | {before / 1e3:.1f} -> {after / 1e3:.1f} ", end="")
-    print(f"({(after / before - 1) * 100:+.2f} %) | < 1 % |")
-    return 0 if alive and not tally.lost and not tally.wrong else 1
+    load = Load(f"{share}/config/models/{MODEL}.yaml")
+    ours = [*OURS, "--ros-args", "-p", f"default_model:={MODEL}"]
+    events = [*ours, "-r", "__node:=with_events", "-p", "executor:=events"]
+    commands = {
+        "ours": ("/limit_surface", ours),
+        "ours, `executor: events`": ("/with_events", events),
+        "empty handlers": ("/bare", BARE),
+    }
+    with contextlib.ExitStack() as stack:
+        nodes = {
+            name: (prefix, stack.enter_context(process(command)))
+            for name, (prefix, command) in commands.items()
+        }
+        right = soak(load, *nodes["ours"], seconds)
+        print("\n### Topic path beside a node with empty handlers\n")
+        print("| load | node | calls/s | wrenches answered | topic path p50 / p99 [ms] ", end="")
+        print("| call p50 / p99 [ms] | share of a core |")
+        print("|---|---|---|---|---|---|---|")
+        for name, period in LOADS.items():
+            for node, (prefix, running) in nodes.items():
+                stream, calls, used, _ = load.run(prefix, running, period, ROW_SECONDS)
+                right = right and not (calls.lost or calls.wrong)
+                print(f"| {name} | {node} | {len(calls.times) / ROW_SECONDS:.0f} ", end="")
+                print(f"| {stream.answered / stream.sent:.1%} ", end="")
+                print(f"| {milliseconds(stream.delays)} | {milliseconds(calls.times)} ", end="")
+                print(f"| {used:.2f} |")
+    return 0 if right else 1
 
 
 if __name__ == "__main__":

@@ -146,10 +146,21 @@ class ModelNode(Node, Generic[Model]):
         if stream:
             self.health.inputs[name] = InputAge()
         reliability = ReliabilityPolicy.BEST_EFFORT if stream else ReliabilityPolicy.RELIABLE
-        self.create_subscription(
+
+        def take(message: Any) -> None:
+            self._take(name, handler, message)
+            # An executor takes one message each time that it waits, and waiting costs it more than
+            # a message: under load the queue would stay full, and each message wait for all of it.
+            for _ in range(DEPTH - 1):
+                taken = subscription.handle.take_message(message_type, False)
+                if taken is None:
+                    break
+                self._take(name, handler, taken[0])
+
+        subscription = self.create_subscription(
             message_type,
             f"~/{name}",
-            functools.partial(self._take, name, handler),
+            take,
             QoSProfile(depth=DEPTH, reliability=reliability),
             event_callbacks=SubscriptionEventCallbacks(
                 incompatible_qos=functools.partial(self._mismatch, name)

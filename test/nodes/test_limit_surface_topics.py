@@ -10,7 +10,11 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
 
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import TwistStamped, WrenchStamped
+from rclpy.duration import Duration
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
 
 from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
 from node_helpers import STAMP, planar_twist, planar_wrench, twist_message, wrench_message
@@ -100,3 +104,31 @@ def test_names_can_be_remapped(ros, client_node, model_file):
     np.testing.assert_allclose(
         planar_twist(twists[0]), model.surface.twist_of_wrench([9.0, 0.0, 0.0]), atol=1e-12
     )
+
+
+def test_messages_that_wait_are_taken_in_one_turn_and_in_order(ros, client_node, model_file):
+    _, path = model_file()
+    reliable = "qos_overrides./limit_surface/wrench.subscription.reliability"
+    node = LimitSurfaceNode(
+        context=ros.context,
+        parameter_overrides=[
+            Parameter("model_files", value=[str(path)]),
+            Parameter(reliable, value="reliable"),
+        ],
+    )
+    executor = SingleThreadedExecutor(context=ros.context)
+    executor.add_node(node)
+    twists = ros.listen(client_node, TwistStamped, "/limit_surface/predicted_twist")
+    loads = client_node.create_publisher(WrenchStamped, "/limit_surface/wrench", 10)
+    ros.matched(loads)
+    ros.matched(node._twists)
+    for second in range(8):
+        loads.publish(wrench_message([9.0, 0.0, 0.0], stamp=Time(sec=second)))
+    assert loads.wait_for_all_acked(Duration(seconds=20))
+    while not node.health.accepted["wrench"]:
+        executor.spin_once(timeout_sec=20.0)
+    assert node.health.accepted["wrench"] == 8
+    ros.wait(lambda: len(twists) == 8)
+    assert [twist.header.stamp.sec for twist in twists] == list(range(8))
+    executor.shutdown()
+    node.destroy_node()
