@@ -38,14 +38,16 @@ class ModelSet(Generic[Model]):
     Args:
         models: The models, at least one, no two of one name.
         default: Name of the model that an empty name stands for; empty: the first.
+        noun: What a request calls such a model, for messages.
 
     Raises:
         FileError: There is no model, or two have one name.
         UnknownModelError: The default is not among them.
     """
 
-    def __init__(self, models: Iterable[Model], default: str = "") -> None:
+    def __init__(self, models: Iterable[Model], default: str = "", noun: str = "model") -> None:
         """Index the models by name."""
+        self._noun = noun
         self._models: dict[str, Model] = {}
         for model in models:
             if model.name in self._models:
@@ -66,7 +68,7 @@ class ModelSet(Generic[Model]):
             return self._models[name or self.default]
         except KeyError:
             raise UnknownModelError(
-                f"no model {name!r} is loaded; loaded are {self.listed()}"
+                f"no {self._noun} {name!r} is loaded; loaded are {self.listed()}"
             ) from None
 
     def __iter__(self) -> Iterator[Model]:
@@ -117,7 +119,10 @@ def _paths_of(path: Path) -> list[Path]:
 
 
 def read_model_set(
-    entries: Iterable[str | Path], read: Callable[[Path], Model], default: str = ""
+    entries: Iterable[str | Path],
+    read: Callable[[Path], Model],
+    default: str = "",
+    noun: str = "model",
 ) -> ModelSet[Model]:
     """Read all files and folders that `entries` name into one set.
 
@@ -125,9 +130,10 @@ def read_model_set(
         entries: Model files, or folders whose *.yaml are taken.
         read: Reader of one file, such as `read_surface_model`.
         default: Name of the default model; empty: the first.
+        noun: What a request calls such a model, for messages.
 
     Raises:
         FileError: A file is absent or not valid, or two models share a name.
         UnknownModelError: The default is not among the models.
     """
-    return ModelSet([read(path) for path in model_paths(entries)], default)
+    return ModelSet([read(path) for path in model_paths(entries)], default, noun)

@@ -100,7 +100,9 @@ class DecayNode(ModelNode[DecayModel]):
     def __init__(self, **options: Any) -> None:
         """Read the models and start serving."""
         super().__init__(NAME, SETTINGS, read_decay_model, **options)
-        self._surfaces = self.add_models(read_surface_model, "surface_files", "default_surface")
+        self._surfaces = self.add_models(
+            read_surface_model, "surface_files", "default_surface", "surface"
+        )
         self._frames = frames.Frames(self, self.values)
         self._inputs = PlanarInputs(self.values, self._frames, self.report)
         self._onset: Onset | None = None

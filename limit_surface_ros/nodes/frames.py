@@ -13,6 +13,7 @@ from rclpy.time import Time
 
 from limit_surface_ros.errors import FrameError, TransformTooNewError, TransformTooOldError
 from limit_surface_ros.nodes.settings import Setting
+from limit_surface_ros.nodes.stamps import nanoseconds
 from limit_surface_ros.nodes.static_transforms import StaticTransforms
 from limit_surface_ros.surface.rigid_transform import RigidTransform
 
@@ -58,7 +59,14 @@ class Frames:
         """Read the static transforms and start listening to tf2 where it is installed."""
         self._parameters = parameters
         self._static = StaticTransforms()
-        self._buffer = _Tf2(node) if parameters["use_tf"] and _tf2_is_installed() else None
+        self._buffer = None
+        unused = _why_tf_is_not_used(parameters)
+        if not unused:
+            self._buffer = _Tf2(node)
+        node.get_logger().info(
+            "frames: by static_transforms, "
+            + (f"not by /tf: {unused}" if unused else "others by /tf")
+        )
         parameters.concern(["static_transforms"], self._prepare)
 
     def to_model(self, target: str, header: Header) -> RigidTransform | None:
@@ -95,8 +103,11 @@ class Frames:
         return apply
 
 
-def _tf2_is_installed() -> bool:
-    return importlib.util.find_spec("tf2_ros") is not None
+def _why_tf_is_not_used(parameters: Parameters) -> str:
+    """Return why not; empty: it is."""
+    if not parameters["use_tf"]:
+        return "use_tf is false"
+    return "" if importlib.util.find_spec("tf2_ros") else "tf2_ros is not installed"
 
 
 class _Tf2:
@@ -111,14 +122,14 @@ class _Tf2:
 
     def look_up(self, target: str, source: str, header: Header) -> RigidTransform:
         """Return the transform at the header's stamp; a zero stamp means the latest."""
+        stamp = nanoseconds(header.stamp)
         try:
-            pose = self._buffer.lookup_transform(
-                target, source, Time.from_msg(header.stamp)
-            ).transform
+            pose = self._buffer.lookup_transform(target, source, Time(nanoseconds=stamp)).transform
         except self._tf2.ExtrapolationException as error:
-            # tf2 tells the two ways of leaving its memory apart in words only.
-            too_new = "future" in str(error)
-            kind = TransformTooNewError if too_new else TransformTooOldError
+            # What is outside of tf2's memory lies before or after it; of a single transform its
+            # words do not tell which.
+            latest = self._buffer.get_latest_common_time(target, source).nanoseconds
+            kind = TransformTooNewError if stamp > latest else TransformTooOldError
             raise kind(
                 f"no transform from frame {source!r} to the model's frame {target!r}: {error}"
             ) from None

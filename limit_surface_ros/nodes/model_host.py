@@ -54,6 +54,7 @@ class ModelHost(Generic[Model]):
         read: Reader of one file.
         files: Name of the parameter that names the files.
         default: Name of the parameter that names the default model.
+        noun: What a request calls such a model, for messages.
 
     Attributes:
         models: The models; replaced as a whole.
@@ -72,8 +73,10 @@ class ModelHost(Generic[Model]):
         read: Callable[[Path], Model],
         files: str = "model_files",
         default: str = "default_model",
+        noun: str = "model",
     ) -> None:
         """Read the models that the parameters name."""
+        self._noun = noun
         self._read = read
         self.names = (files, default)
         parameters.concern(self.names, self._prepare)
@@ -90,7 +93,7 @@ class ModelHost(Generic[Model]):
 
     def _prepare(self, values: Values) -> Callable[[], None]:
         files, default = (values[name] for name in self.names)
-        models = read_model_set(resolved(files), self._read, default)
+        models = read_model_set(resolved(files), self._read, default, self._noun)
 
         def apply() -> None:
             self.models = models

@@ -88,7 +88,7 @@ class ModelNode(Node, Generic[Model]):
         return {"model": self.models.models.default, "models": str(len(self.models.models))}
 
     def add_models(
-        self, read: Callable[[Path], Model2], files: str, default: str
+        self, read: Callable[[Path], Model2], files: str, default: str, noun: str
     ) -> ModelHost[Model2]:
         """Serve models of a second kind, reloaded together with the first.
 
@@ -96,12 +96,13 @@ class ModelNode(Node, Generic[Model]):
             read: Reader of one file.
             files: Name of the parameter that names the files.
             default: Name of the parameter that names the default model.
+            noun: What a request calls such a model, for messages.
 
         Raises:
             LimitSurfaceError: A file is not accepted.
         """
         try:
-            host = ModelHost(self.values, read, files, default)
+            host = ModelHost(self.values, read, files, default, noun)
         except Exception:
             self.destroy_node()
             raise

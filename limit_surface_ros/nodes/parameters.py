@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from typing import TYPE_CHECKING, Any, Protocol
 
 from rcl_interfaces.msg import (
@@ -61,6 +62,7 @@ class Parameters:
         for setting in self._settings.values():
             self._values[setting.name] = _plain(_declared(node, setting))
             setting.verify(self._values[setting.name])
+        _warn_of_unknown(node, self._settings)
         node.add_on_set_parameters_callback(self._prepare)
         node.add_post_set_parameters_callback(self._apply)
 
@@ -152,6 +154,24 @@ def _declared(node: Node, setting: Setting) -> Any:
     if declared.type_ == Parameter.Type.NOT_SET:
         node.set_parameters([Parameter(setting.name, texts, [])])
     return node.get_parameter(setting.name).value
+
+
+def _warn_of_unknown(node: Node, known: Iterable[str]) -> None:
+    """Tell of values given at start that no parameter takes: most are misspelt.
+
+    Those that are like no parameter may be another node's: files and command lines are shared.
+    """
+    # Parameters of QoS are declared when a topic is.
+    given = [name for name in node.handle.get_parameters(Parameter) if "qos_overrides" not in name]
+    for name in given:
+        if node.has_parameter(name):
+            continue
+        sentence = f"parameter {name!r} is not known here and is ignored"
+        like = difflib.get_close_matches(name, known, n=1, cutoff=0.75)
+        if like:
+            node.get_logger().warning(f"{sentence}; did you mean {like[0]!r}?")
+        else:
+            node.get_logger().info(sentence)
 
 
 def _plain(value: Any) -> Any:

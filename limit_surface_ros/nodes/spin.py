@@ -8,6 +8,7 @@ end.
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import socket
 import threading
@@ -22,7 +23,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
-from limit_surface_ros.errors import LimitSurfaceError
+from limit_surface_ros.errors import FileError, LimitSurfaceError
 from limit_surface_ros.nodes.settings import Setting
 
 if TYPE_CHECKING:
@@ -34,6 +35,8 @@ ENDING = (signal.SIGINT, signal.SIGTERM)
 # What a user gets wrong at start is told in one line, without a traceback. rcl's errors, unknown
 # ROS arguments among them, are RuntimeErrors.
 _CONFIGURATION_ERRORS = (LimitSurfaceError, ParameterException, RuntimeError)
+# What names the folder of the log, for rcl.
+_HOMES = ("ROS_LOG_DIR", "ROS_HOME", "HOME")
 EXECUTOR = Setting(
     "executor",
     "single_threaded",
@@ -69,6 +72,9 @@ def run(make_nodes: Callable[[], Sequence[Node]], description: str, argv: Sequen
     )
     try:
         parser.parse_args(remove_ros_args(list(argv))[1:])
+        logs = "--disable-external-lib-logs" not in argv
+        if logs and not any(os.environ.get(name) for name in _HOMES):
+            raise FileError(f"ROS 2 finds no place for its log: set one of {', '.join(_HOMES)}")
         rclpy.init(args=list(argv), signal_handler_options=SignalHandlerOptions.NO)
         nodes = make_nodes()
     except _CONFIGURATION_ERRORS as error:

@@ -199,3 +199,9 @@ def test_reload_swaps_decay_models_and_surfaces_together_or_neither(
     assert done.success, done.message
     after = evaluate(EvaluateDecay.Request(model="fading", times=[1.0]))
     assert after.values[0] == pytest.approx(3.0 * math.exp(-9.0))
+
+
+def test_an_unknown_surface_is_named_with_those_that_are_loaded(stop):
+    answer = stop(PredictStop.Request(wrench=wrench_message([9, 0, 0]), surface="sofa"))
+    assert answer.error_code == ErrorCode.UNKNOWN_MODEL
+    assert answer.error_msg == f"no surface 'sofa' is loaded; loaded are {SURFACE.name}"

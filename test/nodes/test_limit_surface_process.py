@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import signal
 
 import numpy as np
@@ -62,6 +63,44 @@ def test_a_bad_parameter_at_start_is_told_in_one_line(ros, model_file, broken, t
     assert code == 1
     assert told in output
     assert "Traceback" not in output
+
+
+def test_a_misspelt_parameter_is_told_with_the_one_that_was_meant(ros, client_node, model_file):
+    _, path = model_file()
+    given = "-p model_file:=other.yaml -p weather:=fine -p use_sim_time:=false"
+    with started(path, *given.split()) as program:
+        ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
+        _, output = program.end()
+    assert "'model_file' is not known here and is ignored; did you mean 'model_files'?" in output
+    assert "'weather' is not known here" in output
+    assert output.count("not known here") == 2
+
+
+@pytest.mark.parametrize(
+    ("use_tf", "told"),
+    [
+        ("true", "others by /tf" if importlib.util.find_spec("tf2_ros") else "is not installed"),
+        ("false", "not by /tf: use_tf is false"),
+    ],
+)
+def test_it_is_told_whether_tf_is_listened_to(ros, client_node, model_file, use_tf, told):
+    _, path = model_file()
+    with started(path, "-p", f"use_tf:={use_tf}") as program:
+        ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
+        _, output = program.end()
+    (line,) = (line for line in output.splitlines() if "frames: " in line)
+    assert told in line
+
+
+def test_without_a_place_for_the_log_the_reason_is_told_in_one_line(model_file, monkeypatch):
+    for name in ("HOME", "ROS_HOME", "ROS_LOG_DIR"):
+        monkeypatch.delenv(name, raising=False)
+    with started(model_file()[1]) as program:
+        code, output = program.ended()
+    assert code == 1
+    (line,) = output.splitlines()
+    assert "cannot start: " in line
+    assert "ROS_LOG_DIR" in line
 
 
 def test_help_teaches_how_to_give_parameters():

@@ -88,3 +88,7 @@ def test_what_is_no_push_gets_a_code_and_a_sentence(pushed, spoiled, code):
     answer = pushed[1](spoiled)
     assert answer.error_code == code
     assert answer.error_msg
+
+
+def test_a_refused_number_is_named_as_in_the_request(pushed):
+    assert "friction" in pushed[1](request([0, 0], [1, 0], -0.1, [1, 0])).error_msg
