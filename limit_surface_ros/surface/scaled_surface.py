@@ -8,7 +8,8 @@ physical units, to such columns in blocks that fit the processor's cache, and ba
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, ClassVar, TypeVar
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -31,6 +32,12 @@ class ScaledSurface(ABC):
 
     kind: ClassVar[str]
     scaling: Scaling
+    # Every kind is a dataclass.
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what defines the surface: tables made on the way stay out of pickles."""
+        return {each.name: self.__dict__[each.name] for each in fields(self)}
 
     @abstractmethod
     def with_friction_force(self: Self, friction_force: float) -> Self:

@@ -1,5 +1,7 @@
 """A single vector takes a lean path, which must tell the same and refuse the same as the batch."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -126,3 +128,16 @@ def test_motion_and_load_factor_together_are_what_they_are_alone(surface, shape)
     assert factors.shape == shape[:-1]
     np.testing.assert_allclose(twists, surface.twist_of_wrench(wrenches), atol=1e-12)
     np.testing.assert_allclose(factors, surface.load_factor(wrenches), rtol=1e-12)
+
+
+@pytest.mark.parametrize("surface", SURFACES, ids=lambda surface: surface.kind)
+def test_a_surface_is_sent_to_another_process_without_what_it_has_worked_out(surface):
+    before = len(pickle.dumps(surface))
+    vectors = RNG.standard_normal((20_000, 3))
+    wrenches = surface.wrench_of_twist(vectors)
+    surface.twist_of_wrench(vectors)
+    sent = pickle.dumps(surface)
+    assert len(sent) == before
+    np.testing.assert_array_equal(
+        pickle.loads(sent).load_factor(wrenches), surface.load_factor(wrenches)
+    )
