@@ -2,8 +2,8 @@
 
 Five sets of 50 pushes with their fixed splits (../shared/data/pushing). Mean angle [deg] between
 measured and predicted twist of the test rows, the mean over the splits; the choice is made by
-cross-validation on the training rows alone. With `support`, the stated support points are a prior;
-the set with its full face on the ground states none. `--splits N` takes the first N of 20 splits.
+cross-validation on the training rows alone. With `support`, the stated support points are a
+prior; the set with its full face on the ground states none. `--splits N` takes the first N of 20.
 """
 
 from __future__ import annotations
@@ -28,11 +28,13 @@ import numpy as np
 from limit_surface_ros.errors import LimitSurfaceError
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.fitting.automatic import fit_automatically
+from limit_surface_ros.fitting.multi_start import Search
 from limit_surface_ros.fitting.polynomial import fit_polynomial
-from limit_surface_ros.fitting.recipe import Recipe, fit_recipe
+from limit_surface_ros.fitting.power_sum import fit_power_sum
 from limit_surface_ros.fitting.scaled_pairs import scaling_of_pairs
 from limit_surface_ros.surface.measures import mean_angle
 from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.power_sum import thesis_exponents
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data" / "pushing"
 METHODS = ("ellipsoid", "convex 4th order", "auto", "auto with support")
@@ -49,8 +51,10 @@ def test_angle(task: tuple[str, str, list[int]]) -> tuple[float, float]:
     known = None if support is None else PointContacts(*support)
     begin = time.perf_counter()
     if method == "ellipsoid":
-        recipe = Recipe("power_sum", 1, "thesis", 1.0, robust_scale=None)
-        surface = fit_recipe(training, recipe, scaling=scaling).surface
+        search = Search(starts=2)
+        surface = fit_power_sum(
+            training, thesis_exponents(1), scaling=scaling, search=search
+        ).surface
     elif method == "convex 4th order":
         try:
             surface = fit_polynomial(
@@ -68,7 +72,7 @@ def test_angle(task: tuple[str, str, list[int]]) -> tuple[float, float]:
 def main() -> int:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--splits", type=int, default=4)
+    parser.add_argument("--splits", type=int, default=20)
     splits = parser.parse_args().splits
     print(__doc__)
     if not DATA.is_dir():

@@ -35,7 +35,7 @@ def fit_automatically(
         support: Known support points, if there are any.
         folds: Of the cross-validation.
         refits: Of a bootstrap whose surfaces go into the result's details; 0 for none.
-        search: Seed, where to run, and progress; each member of a mean is one start.
+        search: Seed, where to run, and progress.
 
     Raises:
         DataError: The pushes cannot determine a surface.
@@ -52,8 +52,7 @@ def fit_automatically(
         executor=search.executor,
         progress=search.progress,
     )
-    costs = [descent.cost for descent in choice.fit.descents]
-    best = choice.fit.descents[int(np.argmin(costs))]
+    descent = choice.descent
     details: dict[str, Any] = {
         "cross_validation_mean_angle_deg": {
             str(recipe): round(float(np.degrees(angle)), 3)
@@ -66,21 +65,21 @@ def fit_automatically(
             pairs,
             choice.recipe,
             refits,
-            scaling=choice.fit.surface.scaling,
+            scaling=choice.surface.scaling,
             support=support,
             seed=search.seed,
             executor=search.executor,
         )
         details["bootstrap"] = stored_surfaces(surfaces)
     return FitResult(
-        surface=choice.fit.surface,
+        surface=choice.surface,
         objective=str(choice.recipe),
-        cost=float(np.mean(costs)),
-        start_costs=tuple(sorted(costs)),
-        iterations=best.iterations,
-        gradient_norm=best.gradient_norm,
-        converged=all(descent.converged for descent in choice.fit.descents),
+        cost=descent.cost,
+        start_costs=(descent.cost,),
+        iterations=descent.iterations,
+        gradient_norm=descent.gradient_norm,
+        converged=descent.converged,
         wall_time=time.perf_counter() - begin,
-        training=errors_on(choice.fit.surface, pairs),
+        training=errors_on(choice.surface, pairs),
         details=details,
     )

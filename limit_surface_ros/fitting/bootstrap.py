@@ -6,14 +6,13 @@ exponential distribution. The surfaces of many such refits spread as the data al
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from limit_surface_ros.checks import as_floats
-from limit_surface_ros.errors import DataError, RangeError
-from limit_surface_ros.fitting.recipe import Recipe, fit_recipe
+from limit_surface_ros.errors import DataError, RangeError, SolverError
+from limit_surface_ros.fitting.recipe import Workbench
 from limit_surface_ros.surface.dissipation import Dissipation
 from limit_surface_ros.surface.power_sum import PowerSum
 
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.fitting.recipe import Recipe
     from limit_surface_ros.surface.pairs import Pairs
     from limit_surface_ros.surface.point_contacts import PointContacts
     from limit_surface_ros.surface.protocol import LimitSurface
@@ -44,29 +44,40 @@ def bootstrap(
 
     Args:
         pairs: Recorded pushes.
-        recipe: How to fit; its own number of members does not matter.
+        recipe: How to fit.
         count: How many refits, at least 2.
         scaling: Characteristic length and friction force; chosen from the pairs if not given.
         support: Known support points, for recipes held towards them.
-        seed: Of weights and starts.
+        seed: Of weights and random starts.
         executor: Where refits run; here and one by one if not given.
 
     Raises:
         RangeError: `count` is below 2.
         DataError: The pushes cannot determine a surface.
+        SolverError: Fewer than two refits pass through the loads.
     """
     if count < 2:
         raise RangeError(f"a bootstrap needs at least 2 refits, got {count}")
-    fit = fit_recipe(
-        pairs,
-        replace(recipe, members=count),
-        scaling=scaling,
-        support=support,
-        # Apart from the seed of the fit itself, whose members are drawn in the same way.
-        seed=seed + 1,
-        executor=executor,
-    )
-    return fit.members
+    weights = np.random.default_rng([seed, count]).exponential(size=(count, len(pairs)))
+    weights /= weights.mean(axis=1, keepdims=True)
+    tasks = [(Workbench(pairs, scaling, support, each, seed), recipe) for each in weights]
+    if executor is None:
+        found = [_refit(*task) for task in tasks]
+    else:
+        futures = [executor.submit(_refit, *task) for task in tasks]
+        found = [future.result() for future in futures]
+    surfaces = tuple(surface for surface in found if surface is not None)
+    if len(surfaces) < 2:
+        raise SolverError(f"no refits by {recipe} pass through the loads")
+    return surfaces
+
+
+def _refit(bench: Workbench, recipe: Recipe) -> LimitSurface | None:
+    try:
+        return bench.fit(recipe)[0]
+    except SolverError:
+        # Weights under which the fit is lost: the others show the spread.
+        return None
 
 
 def twist_spread(surfaces: Sequence[LimitSurface], wrench: ArrayLike) -> Floats:
@@ -115,7 +126,8 @@ def surfaces_of(stored: Mapping[str, Any], scaling: Scaling) -> tuple[LimitSurfa
         DataError: It is not what `stored_surfaces` makes.
     """
     try:
-        matrices = as_floats("matrices", stored["matrices"])
+        # Refits need not have the same number of terms.
+        matrices = [as_floats("matrices", each) for each in stored["matrices"]]
         if stored["kind"] == PowerSum.kind:
             return tuple(PowerSum(each, stored["exponents"], scaling) for each in matrices)
         return tuple(Dissipation(each, scaling) for each in matrices)

@@ -14,6 +14,7 @@ import numpy as np
 
 from limit_surface_ros.fitting.cholesky import (
     factors_of,
+    factors_of_matrices,
     matrices_of,
     parameter_gradient,
     parameters_of,
@@ -21,6 +22,9 @@ from limit_surface_ros.fitting.cholesky import (
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
+
+# Share of a term that every direction of it has to begin with.
+_SLIVER = 1e-7
 
 
 def floored_matrices(parameters: Floats, floor: float) -> tuple[Floats, Floats]:
@@ -30,6 +34,19 @@ def floored_matrices(parameters: Floats, floor: float) -> tuple[Floats, Floats]:
     if floor > 0.0:
         matrices += floor * _traces(matrices) * np.eye(3)
     return matrices, factors
+
+
+def floored_parameters(matrices: Floats, floor: float) -> Floats:
+    """Return the parameters of the nearest model to `matrices`, shape (k, 3, 3), with the floor.
+
+    Where a matrix is flatter than the floor allows, its smallest part is that of the floor.
+    """
+    below = floor / (1.0 + 3.0 * floor) * _traces(matrices) * np.eye(3)
+    # A factor of zero would stay zero: its matrix does not change with it to first order.
+    sliver = _SLIVER * _traces(matrices) * np.eye(3)
+    values, axes = np.linalg.eigh(matrices - below)
+    positive = (axes * np.maximum(values, 0.0)[:, None]) @ axes.transpose(0, 2, 1)
+    return parameters_of(factors_of_matrices(positive + sliver))
 
 
 def floored_gradient(matrix_gradient: Floats, factors: Floats, floor: float) -> Floats:

@@ -2,19 +2,19 @@
 
 A careless choice loses more than it gains: with two dozen pushes the best of many recipes on
 held-out folds is often the luckiest. So there are few candidates, ordered by how much they are
-trusted beforehand, and a candidate displaces one before it only when it is better by more than two
-standard errors of the difference over the same pushes.
+trusted beforehand, and a candidate displaces one before it only when it is better by more than one
+and a half standard errors of the difference over the same pushes.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from limit_surface_ros.errors import DataError, LimitSurfaceError, RangeError
-from limit_surface_ros.fitting.recipe import FEWEST_PAIRS, Recipe, RecipeFit, fit_recipe
+from limit_surface_ros.fitting.recipe import FEWEST_PAIRS, Recipe, Workbench
 from limit_surface_ros.fitting.scaled_pairs import check_support, scale_pairs
 from limit_surface_ros.surface.measures import angle_error
 from limit_surface_ros.surface.pairs import Pairs
@@ -24,43 +24,31 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.fitting.multi_start import Progress
+    from limit_surface_ros.fitting.multi_start import Descent, Progress
     from limit_surface_ros.surface.point_contacts import PointContacts
+    from limit_surface_ros.surface.protocol import LimitSurface
     from limit_surface_ros.surface.scaling import Scaling
 
-# Pairs from which on a single fit is determined well enough, and averaging costs more than it
-# gives.
-_MANY_PAIRS = 300
-MEMBERS = 8
-# Members of a mean while candidates are compared: enough to rank them, a third of the time.
-_MEMBERS_COMPARED = 3
+# Terms that sum up a pressure: with more, predictions are no better and maps slower.
+_TERMS = 8
 # Standard errors by which a candidate must be better than one that is trusted more.
-_MARGIN = 2.0
+_MARGIN = 1.5
 
 
-def default_candidates(pairs: int, with_support: bool) -> list[Recipe]:
+def default_candidates(with_support: bool) -> list[Recipe]:
     """Return the recipes that `choose_recipe` compares, the most trusted first.
 
     Args:
-        pairs: How many pushes there are.
         with_support: Whether support points are known.
     """
-    mean = Recipe(members=1 if pairs >= _MANY_PAIRS else MEMBERS)
-    held = replace(mean, towards="ellipsoid")
     candidates = [
-        replace(held, strength=2.0),
-        replace(held, strength=8.0),
-        replace(held, velocity_weight=0.5, strength=2.0),
-        replace(held, terms=2, strength=2.0),
-        replace(held, terms=4, strength=2.0),
-        replace(held, kind="power_sum", strength=2.0),
-        replace(mean, kind="power_sum", terms=1),
+        Recipe(terms=_TERMS, towards="pressure", strength=5.0),
+        Recipe(terms=3, towards="ellipsoid", strength=2.0),
+        Recipe("power_sum", 3, velocity_weight=0.5, towards="ellipsoid", strength=2.0),
+        Recipe("power_sum", 1),
     ]
     if with_support:
-        known = replace(mean, towards="support")
-        candidates = [
-            replace(known, strength=strength) for strength in (10.0, 30.0, 100.0, 3.0)
-        ] + candidates
+        candidates.insert(0, Recipe(towards="support", strength=20.0))
     return candidates
 
 
@@ -70,14 +58,16 @@ class Choice:
 
     Attributes:
         recipe: The one that was chosen.
-        fit: It, fitted to all pushes.
+        surface: What it makes of all pushes.
+        descent: How that was found.
         candidates: All that were compared.
         angles: Angle [rad] between each push's twist and what each candidate, fitted without the
             push's fold, predicts; shape (candidates, n), infinite where a fit failed.
     """
 
     recipe: Recipe
-    fit: RecipeFit
+    surface: LimitSurface
+    descent: Descent
     candidates: tuple[Recipe, ...]
     angles: Floats
 
@@ -101,16 +91,16 @@ def choose_recipe(
         folds: k; each push is held out once.
         scaling: Characteristic length and friction force; chosen from the pairs if not given.
         support: Known support points, if there are any.
-        seed: Of folds, weights and starts.
-        executor: Where fits run; here and one by one if not given.
-        progress: Called with (fits done, fits in all).
+        seed: Of folds and starts.
+        executor: Where folds are fitted; here and one by one if not given.
+        progress: Called with (folds done, folds in all).
 
     Raises:
         DataError: The pushes cannot determine a surface.
         RangeError: There are fewer than two folds, or more of them than pushes.
     """
     count = len(pairs)
-    recipes = list(candidates or default_candidates(count, support is not None))
+    recipes = tuple(candidates or default_candidates(support is not None))
     if folds < 2:
         raise RangeError(f"folds must be at least 2, got {folds}")
     scaled = scale_pairs(pairs, scaling)
@@ -119,33 +109,39 @@ def choose_recipe(
         raise RangeError(f"folds must be at most one for each of the {count} pushes, got {folds}")
     scaling = scaled.scaling
     parts = np.array_split(np.random.default_rng(seed).permutation(count), folds)
+    tasks = []
+    for part in parts:
+        seen = np.setdiff1d(np.arange(count), part)
+        training = Pairs(pairs.wrenches[seen], pairs.twists[seen])
+        held_out = Pairs(pairs.wrenches[part], pairs.twists[part])
+        tasks.append((Workbench(training, scaling, support, seed=seed), held_out, recipes))
+    if executor is None:
+        found = (_angles(*task) for task in tasks)
+    else:
+        futures = [executor.submit(_angles, *task) for task in tasks]
+        found = (future.result() for future in futures)
     angles = np.full((len(recipes), count), np.inf)
-    for row, recipe in enumerate(recipes):
-        compared = replace(recipe, members=min(recipe.members, _MEMBERS_COMPARED))
-        for done, part in enumerate(parts):
-            seen = np.setdiff1d(np.arange(count), part)
-            held_out = Pairs(pairs.wrenches[part], pairs.twists[part])
-            training = Pairs(pairs.wrenches[seen], pairs.twists[seen])
-            try:
-                fit = fit_recipe(
-                    training,
-                    compared,
-                    scaling=scaling,
-                    support=support,
-                    seed=seed,
-                    executor=executor,
-                )
-                angles[row, part] = angle_error(fit.surface, held_out)
-            except LimitSurfaceError:
-                # A candidate that a fold cannot support stays infinitely bad.
-                pass
-            if progress is not None:
-                progress(row * len(parts) + done + 1, len(recipes) * len(parts))
+    for done, (part, of_part) in enumerate(zip(parts, found, strict=True), start=1):
+        angles[:, part] = of_part
+        if progress is not None:
+            progress(done, folds)
     if not np.isfinite(angles).all(axis=1).any():
         raise DataError("no candidate could be fitted to every fold: give more pushes")
     recipe = recipes[_chosen(angles)]
-    fit = fit_recipe(pairs, recipe, scaling=scaling, support=support, seed=seed, executor=executor)
-    return Choice(recipe, fit, tuple(recipes), angles)
+    surface, descent = Workbench(pairs, scaling, support, seed=seed).fit(recipe)
+    return Choice(recipe, surface, descent, recipes, angles)
+
+
+def _angles(bench: Workbench, held_out: Pairs, recipes: Sequence[Recipe]) -> Floats:
+    """Return the errors [rad] of each recipe's fit on held-out pushes, shape (recipes, n)."""
+    angles = np.full((len(recipes), len(held_out)), np.inf)
+    for row, recipe in enumerate(recipes):
+        try:
+            angles[row] = angle_error(bench.fit(recipe)[0], held_out)
+        except LimitSurfaceError:
+            # A candidate that a fold cannot support stays infinitely bad.
+            continue
+    return angles
 
 
 def _chosen(angles: Floats) -> int:

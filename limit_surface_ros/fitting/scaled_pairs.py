@@ -58,6 +58,10 @@ class ScaledPairs:
         stride = len(self) // (_COARSE_PAIRS * parameters)
         if stride < _COARSE_STRIDE:
             return None
+        return self.every(stride)
+
+    def every(self, stride: int) -> ScaledPairs:
+        """Return every so many pairs, with weights for the rest."""
         part = slice(None, None, stride)
         weights = self.weights[part] * stride
         return ScaledPairs(self.wrenches[part], self.directions[part], self.scaling, weights)

@@ -19,6 +19,8 @@ _ITERATIONS = 60
 _HALVINGS = 40
 # Newton decrement, relative to D, below which one more step is exact to rounding.
 _NEAR = 1e-9
+# Relative rise of D that is rounding and none to step back from.
+_ROUNDING = 1e-13
 # Positions of the six distinct entries of a symmetric 3x3 matrix.
 _ROWS, _COLUMNS = np.triu_indices(3)
 
@@ -117,7 +119,7 @@ def _backtrack(forms: Floats, place: Floats, step: Floats, total: Floats) -> tup
     for _ in range(_HALVINGS):
         trial = place + step
         speeds = _speeds(forms, trial)
-        worse = speeds.sum(axis=0) > total
+        worse = speeds.sum(axis=0) > (1.0 + _ROUNDING) * total
         if not worse.any():
             return trial, speeds
         step[:, worse] *= 0.5
