@@ -103,8 +103,9 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
     few.add_argument(
         "--auto",
         action="store_true",
-        help="choose kind, terms, weight and what the fit is held towards (where the pushes say the "
-        "body presses, or an ellipsoid) by cross-validation; leaves the options above aside",
+        help="choose kind, terms, weight and what the fit is held towards (the pressure on the "
+        "ground that fits the pushes, or an ellipsoid) by cross-validation; leaves the options "
+        "above aside",
     )
     few.add_argument(
         "--folds",
