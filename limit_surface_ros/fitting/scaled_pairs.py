@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 _ONE_DIRECTION = 0.98
 # Relative second moment below which the loads leave a direction of load untried.
 _UNTRIED = 1e-8
-# Pairs for each parameter that show a fit where to go, and how many times more there must be.
+# A fit finds its way on one of so many pairs, but on so many for each parameter at least.
+_COARSE_STRIDES = range(4, 9)
 _COARSE_PAIRS = 12
-_COARSE_STRIDE = 4
 
 
 @dataclass(frozen=True)
@@ -50,13 +50,13 @@ class ScaledPairs:
         return replace(self, weights=self.weights * weights)
 
     def coarse(self, parameters: int) -> ScaledPairs | None:
-        """Return every so many pairs, with weights for the rest; None where they are few.
+        """Return one of every eight pairs, with weights for the rest; None where they are few.
 
         Args:
-            parameters: Of the fit; a dozen pairs are kept for each.
+            parameters: Of the fit; a dozen pairs are kept for each, if need be one of every four.
         """
-        stride = len(self) // (_COARSE_PAIRS * parameters)
-        if stride < _COARSE_STRIDE:
+        stride = min(len(self) // (_COARSE_PAIRS * parameters), _COARSE_STRIDES[-1])
+        if stride not in _COARSE_STRIDES:
             return None
         part = slice(None, None, stride)
         weights = self.weights[part] * stride
