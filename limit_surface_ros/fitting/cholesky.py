@@ -72,7 +72,7 @@ def one_drawn_anew(parameters: Floats, fresh: Floats, rng: np.random.Generator) 
 
 
 def two_exchanged(parameters: Floats, rng: np.random.Generator) -> Floats:
-    """Return `parameters`, shape (6 m) with m > 1, with two matrices, chosen at random, swapped."""
+    """Return `parameters`, shape (6 m) with m > 1, with two random matrices exchanged."""
     mixed: Floats = parameters.reshape(-1, PARAMETERS_PER_MATRIX).copy()
     two = rng.choice(len(mixed), 2, replace=False)
     mixed[two] = mixed[two[::-1]]
