@@ -8,9 +8,9 @@ one for the model's own motion, in parts of the friction force scale; for dissip
 give loads of motions, f is that of the fresh motions. Quantiles 50 / 95 / 100 %. Forces are in
 units of two friction limits, lengths of 150 mm.
 
-The data behind the known figures were drawn by another generator: a table says between which figures
-ours lie when the data are drawn anew. `cost / best` compares the cost kept to that of many more
-starts of another seed; above 1.01, a deeper minimum was missed.
+The data behind the known figures were drawn by another generator: a table says between which
+figures ours lie when the data are drawn anew. `cost / best` compares the cost kept to that of many
+more starts of another seed; above 1.01, a deeper minimum was missed.
 """
 
 from __future__ import annotations
@@ -157,7 +157,8 @@ def force_quantiles(
     """Return the quantiles of the force error."""
     if surface.kind == "dissipation":
         return quantiles(load_error(surface, test))
-    return quantiles(force_error(surface, exact, random_directions(1000, np.random.default_rng(seed))))
+    loads = random_directions(1000, np.random.default_rng(seed))
+    return quantiles(force_error(surface, exact, loads))
 
 
 def shown(values: np.ndarray) -> str:

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 _ONE_DIRECTION = 0.98
 # Relative second moment below which the loads leave a direction of load untried.
 _UNTRIED = 1e-8
+# The same pairs in other units differ by rounding, which can lead a descent to another minimum
+# where costs have kinks. Far below any measurement they are made the same.
+_DECIMALS = 9
 # A fit finds its way on one of so many pairs, but on so many for each parameter at least.
 _COARSE_STRIDES = range(4, 9)
 _COARSE_PAIRS = 12
@@ -107,7 +110,8 @@ def scale_pairs(pairs: Pairs, scaling: Scaling | None = None) -> ScaledPairs:
     scaling = scaling or scaling_of_pairs(pairs)
     directions = pairs.twists / scaling.twist_unit
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    return ScaledPairs(pairs.wrenches / scaling.wrench_unit, directions, scaling)
+    wrenches = pairs.wrenches / scaling.wrench_unit
+    return ScaledPairs(np.round(wrenches, _DECIMALS), np.round(directions, _DECIMALS), scaling)
 
 
 def check_support(pairs: ScaledPairs, parameters: int) -> None:
