@@ -25,7 +25,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -161,8 +161,8 @@ def force_quantiles(
     return quantiles(force_error(surface, exact, loads))
 
 
-def shown(values: np.ndarray) -> str:
-    """Return three quantiles as the tables have them."""
+def shown(values: Iterable[float]) -> str:
+    """Return quantiles as the tables have them."""
     return " / ".join(f"{value:.3f}".lstrip("0") for value in values)
 
 
@@ -203,7 +203,7 @@ def print_depth(title: str, body: str, exact: PointContacts, search: Search) -> 
     print("| model | cost | best of many | many | cost / best |\n|---|---|---|---|---|")
     for name, fit in models(search, body).items():
         # A polynomial's minimum is one; the slowest fits are left out.
-        if "polynomial" in name or name == "dissipation 4, directions":
+        if "polynomial" in name or "directions" in name:
             continue
         kept, best = fit(pairs), deep[name](pairs)
         # The residual of an exact model is rounding: there is nothing to divide.
@@ -232,7 +232,7 @@ def print_draws(title: str, body: str, exact: PointContacts, search: Search) -> 
             force.append(force_quantiles(result.surface, exact, test, [3, draw]))
         v_known, f_known = KNOWN[body][name]
         print(
-            f"| {name} | {min(costs):.3g}..{max(costs):.3g} | {spread(velocity)} | {v_known} | "
+            f"| {name} | {min(costs):.3g} to {max(costs):.3g} | {spread(velocity)} | {v_known} | "
             f"{spread(force)} | {f_known} |",
             flush=True,
         )
@@ -243,7 +243,7 @@ def spread(quantiles_of_draws: Sequence[np.ndarray]) -> str:
     """Return the least and the most of each quantile as the tables have them."""
     least, most = np.min(quantiles_of_draws, axis=0), np.max(quantiles_of_draws, axis=0)
     return " / ".join(
-        f"{low:.3f}..{high:.3f}".replace("0.", ".") for low, high in zip(least, most, strict=True)
+        f"{shown([low])} to {shown([high])}" for low, high in zip(least, most, strict=True)
     )
 
 
