@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg.blas import dsymv, dsyr2
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -66,11 +67,13 @@ def minimise(
     here, (cost, slope) = start, cost_and_gradient(start)
     steps, evaluations, patience, converged = 0, 1, _PATIENCE, False
     scaled = inverse is not None
-    metric = np.eye(start.size) / max(float(np.linalg.norm(slope)), 1e-300)
-    if inverse is not None:
-        metric = inverse
+    metric = inverse
+    if metric is None:
+        metric = np.eye(start.size) / max(float(np.linalg.norm(slope)), 1e-300)
+    # Of the symmetric metric only the upper triangle is used and kept.
+    metric = np.array(metric, order="F")
     for steps in range(1, most_iterations + 1):  # noqa: B007
-        direction = -(metric @ slope)
+        direction = dsymv(-1.0, metric, slope)
         descent = float(direction @ slope)
         if not descent < 0.0:
             converged = True
@@ -96,21 +99,21 @@ def minimise(
         along = float(moved @ turned)
         if along > 0.0:
             if not scaled:
-                metric = np.eye(start.size) * (along / float(turned @ turned))
+                metric = np.asfortranarray(np.eye(start.size) * (along / float(turned @ turned)))
                 scaled = True
-            metric = _updated(metric, moved, turned, along)
+            _update(metric, moved, turned, along)
         patience = _PATIENCE if gain > precision * cost else patience - 1
         if not patience or not cost > 0.0:
             converged = True
             break
-    return Minimum(here, float(cost), slope, metric, steps, evaluations, converged)
+    whole = np.triu(metric) + np.triu(metric, 1).T
+    return Minimum(here, float(cost), slope, whole, steps, evaluations, converged)
 
 
-def _updated(metric: Floats, moved: Floats, turned: Floats, along: float) -> Floats:
-    """Return the inverse Hessian that also maps `turned` to `moved`."""
-    image = metric @ turned
-    outer = np.multiply.outer(moved, image)
+def _update(metric: Floats, moved: Floats, turned: Floats, along: float) -> None:
+    """Change the inverse Hessian in place to one that also maps `turned` to `moved`."""
+    image = dsymv(1.0, metric, turned)
     scale = (1.0 + float(turned @ image) / along) / along
-    result: Floats = metric - (outer + outer.T) / along
-    result += scale * np.multiply.outer(moved, moved)
-    return result
+    image *= -1.0 / along
+    image += 0.5 * scale * moved
+    dsyr2(1.0, moved, image, a=metric, overwrite_a=1)

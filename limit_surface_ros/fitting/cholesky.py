@@ -15,19 +15,21 @@ if TYPE_CHECKING:
 
 PARAMETERS_PER_MATRIX = 6
 
-_ROWS, _COLUMNS = np.tril_indices(3)
+# Puts six parameters in their places among the nine entries of L.
+_PLACES = np.zeros((PARAMETERS_PER_MATRIX, 9))
+_PLACES[np.arange(PARAMETERS_PER_MATRIX), np.flatnonzero(np.tril(np.ones((3, 3))))] = 1.0
 
 
 def factors_of(parameters: Floats) -> Floats:
     """Return the factors L, shape (m, 3, 3), of flat `parameters`, shape (6 m)."""
-    factors = np.zeros((parameters.size // PARAMETERS_PER_MATRIX, 3, 3))
-    factors[:, _ROWS, _COLUMNS] = parameters.reshape(-1, PARAMETERS_PER_MATRIX)
-    return factors
+    entries: Floats = parameters.reshape(-1, PARAMETERS_PER_MATRIX) @ _PLACES
+    return entries.reshape(-1, 3, 3)
 
 
 def parameters_of(factors: Floats) -> Floats:
     """Return the flat parameters, shape (6 m), of lower-triangular `factors`, shape (m, 3, 3)."""
-    return factors[:, _ROWS, _COLUMNS].ravel()
+    parameters: Floats = factors.reshape(-1, 9) @ _PLACES.T
+    return parameters.ravel()
 
 
 def matrices_of(factors: Floats) -> Floats:
@@ -59,3 +61,19 @@ def factors_of_matrices(matrices: Floats) -> Floats:
     roots = np.sqrt(np.maximum(values, 0.0))[..., None] * vectors.transpose(0, 2, 1)
     upper = np.stack([np.linalg.qr(root, mode="r") for root in roots])
     return np.asarray(upper.transpose(0, 2, 1))
+
+
+def one_drawn_anew(parameters: Floats, fresh: Floats, rng: np.random.Generator) -> Floats:
+    """Return `parameters`, shape (6 m), with one matrix, chosen at random, taken from `fresh`."""
+    mixed: Floats = parameters.reshape(-1, PARAMETERS_PER_MATRIX).copy()
+    term = rng.integers(len(mixed))
+    mixed[term] = fresh.reshape(-1, PARAMETERS_PER_MATRIX)[term]
+    return mixed.ravel()
+
+
+def two_exchanged(parameters: Floats, rng: np.random.Generator) -> Floats:
+    """Return `parameters`, shape (6 m) with m > 1, with two random matrices exchanged."""
+    mixed: Floats = parameters.reshape(-1, PARAMETERS_PER_MATRIX).copy()
+    two = rng.choice(len(mixed), 2, replace=False)
+    mixed[two] = mixed[two[::-1]]
+    return mixed.ravel()

@@ -35,6 +35,10 @@ class SumOfObjectives:
         """Return a start of the first objective."""
         return self.first.start(rng)
 
+    def start_near(self, parameters: Floats, rng: np.random.Generator) -> Floats:
+        """Return a start of the first objective near `parameters`."""
+        return self.first.start_near(parameters, rng)
+
     def coarse(self) -> SumOfObjectives | None:
         """Return the sum on a part of the pairs, if both have one."""
         first, second = self.first.coarse(), self.second.coarse()
@@ -71,6 +75,10 @@ class HeldObjective:
         )
 
     def start(self, rng: np.random.Generator) -> Floats:
+        """Return the centre."""
+        return self.centre
+
+    def start_near(self, parameters: Floats, rng: np.random.Generator) -> Floats:
         """Return the centre."""
         return self.centre
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limit_surface_ros.fitting.cholesky import PARAMETERS_PER_MATRIX
+from limit_surface_ros.fitting.cholesky import PARAMETERS_PER_MATRIX, one_drawn_anew
 from limit_surface_ros.fitting.dissipation_parameters import (
     floored_gradient,
     floored_matrices,
@@ -67,6 +67,10 @@ class DissipationDirectionObjective:
     def start(self, rng: np.random.Generator) -> Floats:
         """Return random terms that together resist loads of the pairs' size."""
         return random_factors(np.asarray(self._pairs.wrenches.T), self._terms, rng)
+
+    def start_near(self, parameters: Floats, rng: np.random.Generator) -> Floats:
+        """Return `parameters` with one term drawn anew."""
+        return one_drawn_anew(parameters, self.start(rng), rng)
 
     def coarse(self) -> DissipationDirectionObjective | None:
         """Return the same fit to a part of the pairs, if they are very many."""

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limit_surface_ros.fitting.cholesky import PARAMETERS_PER_MATRIX
+from limit_surface_ros.fitting.cholesky import PARAMETERS_PER_MATRIX, one_drawn_anew
 from limit_surface_ros.fitting.dissipation_parameters import (
     floored_gradient,
     floored_matrices,
@@ -88,6 +88,10 @@ class DissipationForceObjective:
     def start(self, rng: np.random.Generator) -> Floats:
         """Return random terms that together resist loads of the pairs' size."""
         return random_factors(self._loads, self._terms, rng)
+
+    def start_near(self, parameters: Floats, rng: np.random.Generator) -> Floats:
+        """Return `parameters` with one term drawn anew."""
+        return one_drawn_anew(parameters, self.start(rng), rng)
 
     def coarse(self) -> DissipationForceObjective | None:
         """Return the same fit to a part of the pairs, if they are very many."""

@@ -1,21 +1,25 @@
 """Descents from several seeded starts: in parallel, in a fixed order, stopped when they agree.
 
-Fits of limit surfaces have many local minima. Start number k draws from a generator of its own,
-seeded by (seed, k), and starts are judged in their order; so the outcome is the same whatever the
-number of workers.
+Fits of limit surfaces have many local minima, and the deepest may attract one random start in
+fifty. So only the first half of the starts are random. The others begin near the best so far, with
+a term drawn anew or two exchanged: a few at a time, so that each time knows of the one before
+(basin hopping; Wales and Doye 1997, doi:10.1021/jp970984n).
+
+Start number k draws from a generator of its own, seeded by (seed, k), and starts are judged in
+their order; so the outcome is the same whatever the number of workers.
 """
 
 from __future__ import annotations
 
 import math
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from limit_surface_ros.errors import RangeError, SolverError
-from limit_surface_ros.fitting.bfgs import minimise
+from limit_surface_ros.fitting.bfgs import Minimum, minimise
 from limit_surface_ros.fitting.worker_processes import worker_processes
 
 if TYPE_CHECKING:
@@ -31,6 +35,8 @@ if TYPE_CHECKING:
 AGREEMENT = 1e-3
 PRECISION = 1e-10
 _MOST_ITERATIONS = 2000
+# Starts near the best that are made at a time.
+_ROUND = 4
 # On a part of the pairs the minimum is only approached.
 _COARSE_PRECISION = 1e-6
 
@@ -40,12 +46,13 @@ class Search:
     """How a minimum is looked for, the same for every kind.
 
     Attributes:
-        starts: How many random starts at most.
+        starts: How many starts at most, half of them random.
         seed: The same seed gives the same starts.
         executor: Where starts run; here and one by one if not given. `process_pool` makes one, a
             dask client's `get_executor()` is another.
         progress: Called with (starts done, starts at most) after each.
-        stop_early: Whether half of them that agree on the best are enough.
+        stop_early: Whether it is enough that all random ones found the same minimum and the first
+            near it nothing better.
 
     Raises:
         RangeError: There is no start, or the seed is negative.
@@ -87,38 +94,55 @@ class Descent:
 
 
 def descend(objective: Objective, start: Floats, precision: float = PRECISION) -> Descent:
-    """Minimise by BFGS from `start`, first on a part of the pairs where there are very many.
+    """Minimise by BFGS from `start`, first on a part of the pairs where there are many.
 
     Args:
         objective: What to minimise.
         start: Shape (size,).
         precision: Relative gain of a step below which nothing more is to be gained.
     """
-    coarse, inverse, iterations, evaluations = objective.coarse(), None, 0, 0
-    if coarse is not None:
-        near = minimise(coarse.cost_and_gradient, start, _COARSE_PRECISION, _MOST_ITERATIONS)
-        start, inverse = near.parameters, near.inverse
-        iterations, evaluations = near.iterations, near.evaluations
-    found = minimise(objective.cost_and_gradient, start, precision, _MOST_ITERATIONS, inverse)
+    found = _minimum(objective, start, precision)
     return Descent(
         cost=found.cost,
         parameters=found.parameters,
-        iterations=iterations + found.iterations,
-        evaluations=evaluations + found.evaluations,
+        iterations=found.iterations,
+        evaluations=found.evaluations,
         gradient_norm=float(np.abs(found.gradient).max()),
         converged=found.converged,
     )
 
 
+def _minimum(objective: Objective, start: Floats, precision: float) -> Minimum:
+    """Minimise; the part of the pairs has a part of its own where they are very many."""
+    coarse = objective.coarse()
+    if coarse is None:
+        return minimise(objective.cost_and_gradient, start, precision, _MOST_ITERATIONS)
+    near = _minimum(coarse, start, _COARSE_PRECISION)
+    found = minimise(
+        objective.cost_and_gradient, near.parameters, precision, _MOST_ITERATIONS, near.inverse
+    )
+    return replace(
+        found,
+        iterations=near.iterations + found.iterations,
+        evaluations=near.evaluations + found.evaluations,
+    )
+
+
 def descend_from_seed(
-    objective: Objective, seed: int, index: int, precision: float = PRECISION
+    objective: Objective,
+    seed: int,
+    index: int,
+    precision: float = PRECISION,
+    near: Floats | None = None,
 ) -> Descent:
-    """Minimise from start number `index` of `seed`."""
-    return descend(objective, objective.start(np.random.default_rng([seed, index])), precision)
+    """Minimise from start number `index` of `seed`, which is random or near given parameters."""
+    rng = np.random.default_rng([seed, index])
+    start = objective.start(rng) if near is None else objective.start_near(near, rng)
+    return descend(objective, start, precision)
 
 
 def descents(objective: Objective, search: Search) -> list[Descent]:
-    """Minimise from several starts, in their order, until half of them agree on the best.
+    """Minimise from random starts and then from starts near the best of all before.
 
     Returns:
         One descent for each start that was needed, the best first, equals in their order.
@@ -126,19 +150,27 @@ def descents(objective: Objective, search: Search) -> list[Descent]:
     Raises:
         SolverError: No start led to a finite cost.
     """
-    enough = max(2, math.ceil(search.starts / 2)) if search.stop_early else search.starts
     done: list[Descent] = []
-    for descent in _in_order(objective, search):
-        done.append(descent)
-        if search.progress is not None:
-            search.progress(len(done), search.starts)
-        best = min(each.cost for each in done)
-        agreeing = sum(each.cost <= best * (1.0 + AGREEMENT) for each in done)
-        if agreeing >= enough:
+    random = math.ceil(search.starts / 2)
+    for first in (0, *range(random, search.starts, _ROUND)):
+        last = min(first + _ROUND, search.starts) if done else random
+        best = min(done, key=lambda each: each.cost, default=None)
+        near = None if best is None else best.parameters
+        for descent in _in_order(objective, search, range(first, last), near):
+            done.append(descent)
+            if search.progress is not None:
+                search.progress(len(done), search.starts)
+        if not any(math.isfinite(each.cost) for each in done):
+            raise SolverError(f"none of {len(done)} starts led to a finite cost")
+        if search.stop_early and best is not None and _agree(done, random):
             break
-    if not any(math.isfinite(each.cost) for each in done):
-        raise SolverError(f"none of {search.starts} starts led to a finite cost")
     return sorted(done, key=lambda each: each.cost)
+
+
+def _agree(done: list[Descent], random: int) -> bool:
+    """Tell whether all random starts found the best minimum of all that is known."""
+    most = max(each.cost for each in done[:random])
+    return most <= min(each.cost for each in done) * (1.0 + AGREEMENT)
 
 
 @contextmanager
@@ -158,13 +190,15 @@ def process_pool(workers: int) -> Iterator[Executor | None]:
         yield pool
 
 
-def _in_order(objective: Objective, search: Search) -> Iterator[Descent]:
-    starts, seed, executor = range(search.starts), search.seed, search.executor
-    if executor is None:
-        for index in starts:
-            yield descend_from_seed(objective, seed, index)
+def _in_order(
+    objective: Objective, search: Search, indices: range, near: Floats | None
+) -> Iterator[Descent]:
+    tasks = [(objective, search.seed, index, PRECISION, near) for index in indices]
+    if search.executor is None:
+        for task in tasks:
+            yield descend_from_seed(*task)
         return
-    futures = [executor.submit(descend_from_seed, objective, seed, index) for index in starts]
+    futures = [search.executor.submit(descend_from_seed, *task) for task in tasks]
     try:
         for future in futures:
             yield future.result()

@@ -31,6 +31,10 @@ class Objective(Protocol):
         """Return random parameters from which a descent may begin, shape (size,)."""
         ...
 
+    def start_near(self, parameters: Floats, rng: np.random.Generator) -> Floats:
+        """Return a start for which one or two terms of `parameters` are changed, shape (size,)."""
+        ...
+
     def coarse(self) -> Objective | None:
         """Return the same problem on a part of the pairs, None where they are few anyway.
 

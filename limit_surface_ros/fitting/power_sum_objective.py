@@ -9,8 +9,7 @@ which is along v - (v . v^) v^; then
 
     dJ/dA_i = sum_k a_ik f f' + c_ik s f',   a_ik = c_ik (m (H - 1) + (p_i - 1) (s' A_i f) / q_i)
 
-so that the gradient of all terms is one matrix product over the pairs, about twice the work of
-the cost alone.
+so that cost and gradient are a few matrix products of the matrices' entries with f f' and s f'.
 """
 
 from __future__ import annotations
@@ -23,8 +22,10 @@ from limit_surface_ros.fitting.cholesky import (
     PARAMETERS_PER_MATRIX,
     factors_of,
     matrices_of,
+    one_drawn_anew,
     parameter_gradient,
     parameters_of,
+    two_exchanged,
 )
 from limit_surface_ros.fitting.direction_loss import direction_loss
 from limit_surface_ros.surface.power_sum import PowerSum
@@ -38,6 +39,8 @@ if TYPE_CHECKING:
 _TINY = 1e-100
 # Logarithmic spread of the axes of random terms.
 _START_SPREAD = 1.5
+# Pairs that are worked through at a time: what is computed of them stays in the cache.
+_BLOCK = 3072
 
 
 class PowerSumObjective:
@@ -50,7 +53,7 @@ class PowerSumObjective:
         velocity_weight: float,
         robust_scale: float | None = None,
     ) -> None:
-        """Hold the pairs, one column each, and the work arrays.
+        """Hold the pairs in blocks.
 
         Args:
             pairs: What to fit.
@@ -61,28 +64,16 @@ class PowerSumObjective:
         self._pairs = pairs
         self._arguments = (pairs, exponents, velocity_weight, robust_scale)
         self._exponents = exponents
-        self._velocity_weight = velocity_weight
-        self._robust_scale = robust_scale
         self._scaling = pairs.scaling
-        self._weights = pairs.weights
-        self._loads = np.ascontiguousarray(pairs.wrenches.T)
-        self._directions = np.ascontiguousarray(pairs.directions.T)
-        self._powers = exponents[:, None]
-        self._allocate(exponents.size, len(pairs))
-
-    def _allocate(self, terms: int, pairs: int) -> None:
-        # A step allocates nothing of the pairs' size: memory that goes back to the system at
-        # each step costs three times the arithmetic.
-        self._products = np.empty((terms, 3, pairs))
-        self._weighted = np.empty((terms, 3, pairs))
-        self._forms = np.empty((terms, pairs))
-        self._values = np.empty((terms, pairs))
-        self._slopes = np.empty((terms, pairs))
-        self._bends = np.empty((terms, pairs))
-        self._normals = np.empty((3, pairs))
+        parts = np.array_split(np.arange(len(pairs)), -(-len(pairs) // _BLOCK))
+        room = np.empty((6 * exponents.size + 12, len(parts[0])))
+        self._blocks = [
+            _Block(pairs, slice(part[0], part[-1] + 1), self._arguments[1:], room)
+            for part in parts
+        ]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Travel to other processes without the work arrays."""
+        """Travel to other processes without what follows from the pairs."""
         return type(self), self._arguments
 
     @property
@@ -92,46 +83,22 @@ class PowerSumObjective:
 
     def cost(self, parameters: Floats) -> float:
         """Return the cost alone."""
-        matrices = matrices_of(factors_of(parameters))
-        residual = self._evaluate(matrices)
-        cost = self._weights @ residual**2
-        if self._velocity_weight > 0.0:
-            loss, _ = direction_loss(self._normalise()[1], self._robust_scale)
-            cost += self._velocity_weight * (self._weights @ loss)
-        return float(cost)
+        entries = matrices_of(factors_of(parameters)).reshape(-1, 9)
+        return sum(block.cost(entries) for block in self._blocks)
 
     def cost_and_gradient(self, parameters: Floats) -> tuple[float, Floats]:
         """Return the cost and its gradient, shape (6 m,)."""
         factors = factors_of(parameters)
-        residual = self._evaluate(matrices_of(factors))
-        cost = self._weights @ residual**2
-        residual *= self._weights
-        loads, bends, slopes = self._loads, self._bends, self._slopes
-        if self._velocity_weight > 0.0:
-            norms, cosines = self._normalise()
-            loss, slope = direction_loss(cosines, self._robust_scale)
-            cost += self._velocity_weight * (self._weights @ loss)
-            pull = self._normals
-            pull *= -cosines
-            pull += self._directions
-            pull *= slope * (self._velocity_weight * self._weights / norms)
-            np.einsum("mcn,cn->mn", self._products, pull, out=bends)
-            bends *= self._powers - 1.0
-            bends /= self._forms
-            bends += residual
-            bends *= slopes
-            weighted = np.multiply(slopes[:, None], pull, out=self._weighted)
-            # The products A_i f are no longer needed: their array takes the other half.
-            weighted += np.multiply(bends[:, None], loads, out=self._products)
-        else:
-            np.multiply(slopes, residual, out=bends)
-            weighted = np.multiply(bends[:, None], loads, out=self._weighted)
-        gradient = weighted.reshape(-1, loads.shape[1]) @ loads.T
-        return float(cost), parameter_gradient(gradient.reshape(-1, 3, 3), factors)
+        entries = (factors @ factors.transpose(0, 2, 1)).reshape(-1, 9)
+        cost, gradient = 0.0, np.zeros_like(entries)
+        for block in self._blocks:
+            cost += block.cost(entries, gradient)
+        return cost, parameter_gradient(gradient.reshape(-1, 3, 3), factors)
 
     def start(self, rng: np.random.Generator) -> Floats:
         """Return random factors, whitened by the loads, with every term 1/m on average."""
-        spread = self._loads @ self._loads.T / self._loads.shape[1]
+        loads = self._pairs.wrenches
+        spread = loads.T @ loads / len(loads)
         spread += 1e-9 * np.trace(spread) * np.eye(3)
         whitener = np.linalg.inv(np.linalg.cholesky(spread)).T
         factors = np.tril(rng.normal(size=(self._exponents.size, 3, 3)))
@@ -141,9 +108,15 @@ class PowerSumObjective:
         )
         # Terms of very different shape: starts of like terms miss the deepest minima.
         factors *= np.exp(_START_SPREAD * rng.normal(size=(self._exponents.size, 3, 1)))
-        self._evaluate(matrices_of(factors))
-        scale: Floats = self._values.mean(axis=1) * self._exponents.size
-        return parameters_of(factors * (scale ** (-0.5 / self._exponents))[:, None, None])
+        forms = np.stack([np.sum((loads @ factor) ** 2, axis=1) for factor in factors])
+        sizes: Floats = np.mean(forms ** self._exponents[:, None], axis=1) * self._exponents.size
+        return parameters_of(factors * (sizes ** (-0.5 / self._exponents))[:, None, None])
+
+    def start_near(self, parameters: Floats, rng: np.random.Generator) -> Floats:
+        """Return `parameters` with a term drawn anew, or two of unlike exponents exchanged."""
+        if np.ptp(self._exponents) > 0.0 and rng.random() < 0.5:
+            return two_exchanged(parameters, rng)
+        return one_drawn_anew(parameters, self.start(rng), rng)
 
     def coarse(self) -> PowerSumObjective | None:
         """Return the same fit to a part of the pairs, if they are very many."""
@@ -154,24 +127,107 @@ class PowerSumObjective:
         """Return the power sum of `parameters`."""
         return PowerSum(matrices_of(factors_of(parameters)), self._exponents, self._scaling)
 
-    def _evaluate(self, matrices: Floats) -> Floats:
-        """Fill products A_i f, forms q_i, values q_i^p_i and slopes c_i; return H - 1."""
-        loads, forms, values, slopes = self._loads, self._forms, self._values, self._slopes
-        np.matmul(matrices.reshape(-1, 3), loads, out=self._products.reshape(-1, loads.shape[1]))
-        np.einsum("mcn,cn->mn", self._products, loads, out=forms)
+
+class _Block:
+    """A part of the pairs, one column each, and the work arrays that blocks share in turn.
+
+    A step allocates nothing but rows: memory that goes back to the system at each step costs
+    more than the arithmetic.
+    """
+
+    def __init__(
+        self,
+        pairs: ScaledPairs,
+        part: slice,
+        arguments: tuple[Floats, float, float | None],
+        room: Floats,
+    ) -> None:
+        exponents, self._velocity_weight, self._robust_scale = arguments
+        self._powers = exponents.tolist()
+        self._weights = pairs.weights[part]
+        self._motion_weights = self._velocity_weight * self._weights
+        self._loads = np.ascontiguousarray(pairs.wrenches[part].T)
+        self._directions = np.ascontiguousarray(pairs.directions[part].T)
+        self._squares = (self._loads[:, None] * self._loads).reshape(9, -1)
+        terms, size = len(self._powers), self._weights.size
+        room = room.ravel()[: len(room) * size].reshape(-1, size)
+        ends = np.cumsum([terms, terms, terms, 3 * terms, 9])
+        self._forms, self._values, self._slopes, self._products, self._outer, self._normals = (
+            np.split(room, ends)
+        )
+
+    def cost(self, entries: Floats, gradient: Floats | None = None) -> float:
+        """Return the cost; add its gradient with respect to the matrices' entries.
+
+        Args:
+            entries: Of the matrices A_i, shape (m, 9).
+            gradient: What the gradient is added to, shape (m, 9).
+        """
+        slopes, bends = self._slopes, self._values
+        residual = self._evaluate(entries)
+        weighted = residual * self._weights
+        cost = weighted @ residual
+        if self._velocity_weight > 0.0:
+            norms, cosines = self._normals_of(entries)
+            loss, slope = direction_loss(cosines, self._robust_scale)
+            cost += self._motion_weights @ loss
+            if gradient is not None:
+                outer = self._pull(slope, norms, cosines)
+                np.matmul(entries, outer, out=bends)
+                gradient += slopes @ outer.T
+                for bend, form, power in zip(bends, self._forms, self._powers, strict=True):
+                    bend *= power - 1.0
+                    bend /= form
+                    bend += weighted
+                bends *= slopes
+        elif gradient is not None:
+            np.multiply(slopes, weighted, out=bends)
+        if gradient is not None:
+            gradient += bends @ self._squares.T
+        return float(cost)
+
+    def _evaluate(self, entries: Floats) -> Floats:
+        """Fill forms q_i, values q_i^p_i and slopes c_i; return H - 1."""
+        forms = np.matmul(entries, self._squares, out=self._forms)
         np.maximum(forms, _TINY, out=forms)
-        np.log(forms, out=values)
-        values *= self._powers
-        np.exp(values, out=values)
-        np.divide(values, forms, out=slopes)
-        slopes *= 2.0 * self._powers
-        residual: Floats = values.sum(axis=0) - 1.0
+        residual = np.full(self._weights.size, -1.0)
+        # Term by term: along rows, numbers multiply twice as fast as along columns.
+        for form, value, slope, power in zip(
+            forms, self._values, self._slopes, self._powers, strict=True
+        ):
+            if power == 1.0:
+                residual += form
+                slope.fill(2.0)
+                continue
+            if power == 0.5:
+                np.sqrt(form, out=value)
+            else:
+                np.log(form, out=value)
+                value *= power
+                np.exp(value, out=value)
+            residual += value
+            np.divide(value, form, out=slope)
+            slope *= 2.0 * power
         return residual
 
-    def _normalise(self) -> tuple[Floats, Floats]:
-        """Fill the unit normals; return the gradients' norms and v . v^."""
-        normals = np.einsum("mn,mcn->cn", self._slopes, self._products, out=self._normals)
+    def _normals_of(self, entries: Floats) -> tuple[Floats, Floats]:
+        """Fill the gradients of H; return their norms and v . v^."""
+        np.matmul(entries.reshape(-1, 3), self._loads, out=self._products)
+        products = self._products.reshape(-1, 3, self._weights.size)
+        normals = np.einsum("mn,mcn->cn", self._slopes, products, out=self._normals)
         norms = np.sqrt(np.einsum("cn,cn->n", normals, normals))
         np.maximum(norms, _TINY, out=norms)
-        normals /= norms
-        return norms, np.einsum("cn,cn->n", normals, self._directions)
+        cosines = np.einsum("cn,cn->n", normals, self._directions)
+        cosines /= norms
+        return norms, cosines
+
+    def _pull(self, slope: Floats, norms: Floats, cosines: Floats) -> Floats:
+        """Return s f', shape (9, n), from the loss's slope along the cosine."""
+        slope *= self._motion_weights
+        slope /= norms
+        pull = self._normals
+        pull *= -cosines / norms
+        pull += self._directions
+        pull *= slope
+        np.multiply(pull[:, None], self._loads, out=self._outer.reshape(3, 3, -1))
+        return self._outer

@@ -19,9 +19,12 @@ if TYPE_CHECKING:
 _ONE_DIRECTION = 0.98
 # Relative second moment below which the loads leave a direction of load untried.
 _UNTRIED = 1e-8
-# Pairs for each parameter that show a fit where to go, and how many times more there must be.
+# The same pairs in other units differ by rounding, which can lead a descent to another minimum
+# where costs have kinks. Far below any measurement they are made the same.
+_DECIMALS = 9
+# A fit finds its way on one of so many pairs, but on so many for each parameter at least.
+_COARSE_STRIDES = range(4, 9)
 _COARSE_PAIRS = 12
-_COARSE_STRIDE = 4
 
 
 @dataclass(frozen=True)
@@ -50,13 +53,13 @@ class ScaledPairs:
         return replace(self, weights=self.weights * weights)
 
     def coarse(self, parameters: int) -> ScaledPairs | None:
-        """Return every so many pairs, with weights for the rest; None where they are few.
+        """Return one of every eight pairs, with weights for the rest; None where they are few.
 
         Args:
-            parameters: Of the fit; a dozen pairs are kept for each.
+            parameters: Of the fit; a dozen pairs are kept for each, if need be one of every four.
         """
-        stride = len(self) // (_COARSE_PAIRS * parameters)
-        if stride < _COARSE_STRIDE:
+        stride = min(len(self) // (_COARSE_PAIRS * parameters), _COARSE_STRIDES[-1])
+        if stride not in _COARSE_STRIDES:
             return None
         return self.every(stride)
 
@@ -111,7 +114,8 @@ def scale_pairs(pairs: Pairs, scaling: Scaling | None = None) -> ScaledPairs:
     scaling = scaling or scaling_of_pairs(pairs)
     directions = pairs.twists / scaling.twist_unit
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    return ScaledPairs(pairs.wrenches / scaling.wrench_unit, directions, scaling)
+    wrenches = pairs.wrenches / scaling.wrench_unit
+    return ScaledPairs(np.round(wrenches, _DECIMALS), np.round(directions, _DECIMALS), scaling)
 
 
 def check_support(pairs: ScaledPairs, parameters: int) -> None:

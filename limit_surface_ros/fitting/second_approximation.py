@@ -100,6 +100,10 @@ class SecondObjective:
         terms = PowerSumObjective(self._pairs, np.array([1.0, 0.5]), 0.0).start(rng)
         return terms[PARAMETERS_PER_MATRIX:]
 
+    def start_near(self, parameters: Floats, rng: np.random.Generator) -> Floats:
+        """Return another random B: it is the only term."""
+        return self.start(rng)
+
     def coarse(self) -> SecondObjective | None:
         """Return the same fit to a part of the pairs, if they are very many."""
         part = self._pairs.coarse(self.size)

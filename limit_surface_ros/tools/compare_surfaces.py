@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.errors import LimitSurfaceError, RangeError
+from limit_surface_ros.errors import DataError, LimitSurfaceError, RangeError
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.fitting.multi_start import Search, process_pool
 from limit_surface_ros.fitting.result import errors_on
@@ -57,6 +57,7 @@ FITS: dict[str, dict[str, object]] = {
     "dissipation": {"kind": "dissipation"},
     "polynomial": {"kind": "polynomial"},
     "convex": {"kind": "polynomial", "objective": "convex"},
+    "second": {"kind": "power_sum", "objective": "second"},
     "auto": {"auto": True},
 }
 
@@ -146,8 +147,14 @@ def run(options: argparse.Namespace) -> None:
     stored = {path: read_surface_model(path) for path in options.models}
     data = read_input(options.data, options)
     test = data.held_out or data.training
+    stems = [path.stem for path in stored]
     surfaces: list[tuple[str, LimitSurface, float | None]] = [
-        (path.stem, model.surface, model.fit.get("wall_time_s")) for path, model in stored.items()
+        (
+            path.stem if stems.count(path.stem) == 1 else str(path),
+            model.surface,
+            model.fit.get("wall_time_s"),
+        )
+        for path, model in stored.items()
     ]
     refusals: list[str] = []
     with process_pool(options.workers) as executor, progress_bar("fits") as progress:
@@ -158,6 +165,8 @@ def run(options: argparse.Namespace) -> None:
             except LimitSurfaceError as error:
                 refusals.append(f"{word}: {error}")
             progress(done, len(wanted))
+    if not surfaces:
+        raise DataError(f"nothing to compare is left: {'; '.join(refusals)}")
     kept = "held out" if data.held_out is not None else "fitted"
     print(f"{options.data}: {len(test)} pairs, {kept}")
     print_table([row_of(*each[:2], test, each[2]) for each in surfaces])

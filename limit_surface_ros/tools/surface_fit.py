@@ -96,7 +96,12 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
         metavar="W",
         help="weight of the motions, in all but J1 and forces (%(default)s)",
     )
-    fit.add_argument("--starts", type=int, default=16, help="random starts at most (%(default)s)")
+    fit.add_argument(
+        "--starts",
+        type=int,
+        default=16,
+        help="starts at most, half of them random, the others near the best so far (%(default)s)",
+    )
     fit.add_argument("--seed", type=int, default=0, help="of all that is random (%(default)s)")
 
     few = parser.add_argument_group("few, noisy pushes")

@@ -9,7 +9,8 @@ from limit_surface_ros.errors import DataError, RangeError
 from limit_surface_ros.fitting.multi_start import Search, process_pool
 from limit_surface_ros.fitting.power_sum import fit_power_sum
 from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
-from limit_surface_ros.fitting.scaled_pairs import scale_pairs
+from limit_surface_ros.fitting.scaled_pairs import ScaledPairs, scale_pairs
+from limit_surface_ros.fitting.simulation import simulated_pairs
 from limit_surface_ros.surface.measures import quantiles, velocity_error
 from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.point_contacts import PointContacts
@@ -115,15 +116,58 @@ def test_workers_do_not_change_the_result():
     np.testing.assert_array_equal(alone.surface.matrices, shared.surface.matrices)
 
 
-def test_starts_end_early_when_half_of_them_agree():
+def test_starts_end_early_when_all_random_ones_and_those_near_the_best_agree():
     seen = []
     result = fit_power_sum(
         triangle_pairs(150, 10),
         [1.0],
         search=Search(20, progress=lambda done, total: seen.append((done, total))),
     )
-    assert 10 <= len(result.start_costs) < 20
+    assert 10 < len(result.start_costs) < 20
     assert seen[-1] == (len(result.start_costs), 20)
+    np.testing.assert_allclose(result.start_costs, result.cost, rtol=1e-3)
+
+
+def test_many_starts_that_agree_on_a_worse_minimum_do_not_end_the_search():
+    # Of three terms some six random starts in seven end in a minimum that costs 13 % more.
+    result = fit_power_sum(
+        simulated_pairs(TRIANGLE), thesis_exponents(3), scaling=SCALING, search=Search(32)
+    )
+    assert sum(cost > 1.1 * result.cost for cost in result.start_costs) > 4
+    assert result.cost == pytest.approx(26.2332, rel=1e-4)
+
+
+@pytest.mark.parametrize("exponents", [(1.0, 2 / 3, 1 / 3), (0.5, 0.5, 0.5)])
+def test_a_start_near_known_terms_keeps_the_others(exponents):
+    objective = PowerSumObjective(
+        scale_pairs(triangle_pairs(40, 3), SCALING), np.array(exponents), 1.0
+    )
+    known = np.arange(18.0)
+    kept, exchanged = set(), 0
+    for seed in range(40):
+        near = objective.start_near(known, np.random.default_rng(seed)).reshape(3, 6)
+        same = (near == known.reshape(3, 6)).all(axis=1)
+        kept.add(int(same.sum()))
+        exchanged += bool(np.isin(near, known).all())
+    assert kept == ({1, 2} if len(set(exponents)) > 1 else {2})
+    assert 10 < exchanged < 30 if len(set(exponents)) > 1 else exchanged == 0
+
+
+@pytest.mark.parametrize("weight", [0.0, 1.0])
+def test_pairs_in_blocks_cost_what_they_cost_apart(weight):
+    pairs = scale_pairs(random_motions(TRIANGLE, 7000, 0), SCALING)
+    parts = [
+        ScaledPairs(pairs.wrenches[part], pairs.directions[part], SCALING)
+        for part in (slice(0, 2500), slice(2500, 4600), slice(4600, None))
+    ]
+    whole, *apart = (
+        PowerSumObjective(each, thesis_exponents(2), weight) for each in (pairs, *parts)
+    )
+    start = whole.start(np.random.default_rng(0))
+    cost, gradient = whole.cost_and_gradient(start)
+    costs, gradients = zip(*(each.cost_and_gradient(start) for each in apart), strict=True)
+    assert cost == pytest.approx(sum(costs), rel=1e-12)
+    np.testing.assert_allclose(gradient, sum(gradients), rtol=1e-9)
 
 
 def test_matrices_are_positive_semidefinite_and_loads_keep_their_scale():

@@ -40,6 +40,17 @@ def test_files_and_kinds_stand_in_one_table(contact, tmp_path, capsys):
     assert [cells[2] for cells in table.values()] == ["6", "12", "18"]
 
 
+def test_models_of_one_file_name_are_told_apart_by_their_folders(contact, tmp_path, capsys):
+    paths = [tmp_path / folder / "model.yaml" for folder in ("first", "second")]
+    for path, size in zip(paths, (1.0, 2.0), strict=True):
+        path.parent.mkdir()
+        surface = PowerSum(np.diag([1.0, size, 1.0])[None], [1.0], Scaling(0.08, 1.0))
+        write_surface_model(SurfaceModel("model", surface), path)
+    few = ["--motions", "50", "--facet-loads", "0", "--workers", "1"]
+    assert main([str(contact), "--models", *map(str, paths), *few]) == 0
+    assert list(rows(capsys.readouterr().out)) == [str(path) for path in paths]
+
+
 def test_the_distributions_are_drawn(contact, tmp_path, capsys):
     pytest.importorskip("matplotlib", reason="the extra 'plots' is not installed")
     picture = tmp_path / "errors.png"
@@ -69,3 +80,14 @@ def test_a_kind_that_the_data_cannot_support_is_left_out_with_its_reason(contact
     printed = capsys.readouterr().out
     assert "left out: thesis:3: 16 pairs cannot determine 18 parameters" in printed
     assert "thesis:1 " in printed
+
+
+def test_where_no_kind_can_be_fitted_nothing_is_drawn(contact, tmp_path, capsys):
+    picture = tmp_path / "errors.png"
+    few = ["--motions", "10", "--facet-loads", "0", "--workers", "1"]
+    fits = ["--fit", "second", "norms:2"]
+    assert main([str(contact), *fits, "--picture", str(picture), *few]) == 2
+    error = capsys.readouterr().err
+    assert "second: 10 pairs cannot determine 12 parameters" in error
+    assert "norms:2: 10 pairs" in error
+    assert not picture.exists()
