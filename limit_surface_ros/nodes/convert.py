@@ -95,13 +95,18 @@ def fill_twist(message: Twist, twist: Sequence[float]) -> None:
     message.linear.x, message.linear.y, message.angular.z = map(float, twist)
 
 
-def rows_of(name: str, numbers: array[float]) -> Floats:
+def rows_of(name: str, numbers: array[float], most: int) -> Floats:
     """Return a flat, row-major float64[] field as rows of three, without copying it.
+
+    Args:
+        name: Name of the field.
+        numbers: What it holds.
+        most: Number of rows that are accepted.
 
     Raises:
         ShapeError: The length is no multiple of three.
         NotFiniteError: A number is NaN or infinite.
-        RangeError: A row is beyond `LARGEST` or below `SMALLEST` in size.
+        RangeError: Rows are too many, or one is beyond `LARGEST` or below `SMALLEST` in size.
         ZeroVectorError: A row is zero; all these errors name the first bad row.
     """
     flat = np.frombuffer(numbers, dtype=np.float64) if len(numbers) else np.empty(0)
@@ -110,6 +115,10 @@ def rows_of(name: str, numbers: array[float]) -> Floats:
             f"{name} must hold 3 numbers a row, row after row; {flat.size} is no multiple of 3"
         )
     rows = flat.reshape(-1, 3)
+    if len(rows) > most:
+        raise RangeError(
+            f"{name} holds {len(rows)} rows; at most {most} are accepted, see max_batch_rows"
+        )
     x, y, turn = np.abs(rows).T
     # Column by column: numpy reduces short rows one by one.
     sizes = np.maximum(np.maximum(x, y), turn)

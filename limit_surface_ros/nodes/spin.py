@@ -12,6 +12,7 @@ import os
 import signal
 import socket
 import threading
+import time
 import traceback
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +38,9 @@ ENDING = (signal.SIGINT, signal.SIGTERM)
 _CONFIGURATION_ERRORS = (LimitSurfaceError, ParameterException, RuntimeError)
 # What names the folder of the log, for rcl.
 _HOMES = ("ROS_LOG_DIR", "ROS_HOME", "HOME")
+# The middleware is still sending a large answer when the call is over; it is lost if the node is
+# gone before [s].
+TIME_TO_SEND = 0.3
 EXECUTOR = Setting(
     "executor",
     "single_threaded",
@@ -85,6 +89,7 @@ def run(make_nodes: Callable[[], Sequence[Node]], description: str, argv: Sequen
     for node in nodes:
         executor.add_node(node)
     _spin_until_woken(executor, woken, wakes)
+    time.sleep(TIME_TO_SEND)
     executor.shutdown()
     for node in nodes:
         node.destroy_node()

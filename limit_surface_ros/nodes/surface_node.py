@@ -20,6 +20,7 @@ from limit_surface_ros.nodes.model_host import model_settings
 from limit_surface_ros.nodes.model_info import model_info
 from limit_surface_ros.nodes.model_node import ModelNode
 from limit_surface_ros.nodes.planar_inputs import PlanarInputs
+from limit_surface_ros.nodes.settings import Setting
 from limit_surface_ros.nodes.surface_markers import SurfaceMarkers
 from limit_surface_ros.surface.planar import power
 from limit_surface_ros.surface.pushing import push
@@ -32,6 +33,13 @@ if TYPE_CHECKING:
 NAME = "limit_surface"
 SETTINGS = (
     *model_settings("config/models", "limit surfaces"),
+    Setting(
+        "max_batch_rows",
+        1_000_000,
+        "Rows of a batch that are answered at once; nothing else is answered meanwhile",
+        minimum=1,
+        maximum=1_000_000_000,
+    ),
     *frames.SETTINGS,
     *planar_inputs.SETTINGS,
     *surface_markers.SETTINGS,
@@ -98,7 +106,7 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
         self, request: WrenchesToTwists.Request, response: WrenchesToTwists.Response
     ) -> None:
         surface = self._inputs.surface(self.models[request.model])
-        wrenches = convert.rows_of("wrenches", request.wrenches)
+        wrenches = convert.rows_of("wrenches", request.wrenches, self.values["max_batch_rows"])
         twists, factors = surface.twist_and_load_factor(wrenches)
         response.twists, response.load_factors = convert.flat_of(twists), convert.flat_of(factors)
 
@@ -106,7 +114,7 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
         self, request: TwistsToWrenches.Request, response: TwistsToWrenches.Response
     ) -> None:
         surface = self._inputs.surface(self.models[request.model])
-        twists = convert.rows_of("twists", request.twists)
+        twists = convert.rows_of("twists", request.twists, self.values["max_batch_rows"])
         wrenches = surface.wrench_of_twist(twists)
         response.wrenches = convert.flat_of(wrenches)
         response.powers = convert.flat_of(power(wrenches, twists))

@@ -46,6 +46,21 @@ def test_answers_equal_the_library(batch, count):
     np.testing.assert_allclose(needed.powers, (expected * twists).sum(axis=1), rtol=1e-12)
 
 
+def test_more_rows_than_are_accepted_get_a_code_and_the_limit(ros, client_node, model_file):
+    _, path = model_file()
+    ros.add(LimitSurfaceNode, files=[path], parameters={"max_batch_rows": 100})
+    forward = ros.client(client_node, WrenchesToTwists, "/limit_surface/wrenches_to_twists")
+    back = ros.client(client_node, TwistsToWrenches, "/limit_surface/twists_to_wrenches")
+    for count, code in ((100, ErrorCode.NONE), (101, ErrorCode.OUT_OF_RANGE)):
+        flat = convert.flat_of(vectors(count))
+        for answer in (
+            forward(WrenchesToTwists.Request(wrenches=flat)),
+            back(TwistsToWrenches.Request(twists=flat)),
+        ):
+            assert answer.error_code == code
+            assert ("at most 100" in answer.error_msg) == (code != ErrorCode.NONE)
+
+
 def test_no_rows_are_answered_by_no_rows(batch):
     _, forward, back = batch
     answer, needed = forward(WrenchesToTwists.Request()), back(TwistsToWrenches.Request())

@@ -27,8 +27,11 @@ from limit_surface_interfaces.srv import (
 )
 from rclpy.serialization import serialize_message
 
+from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
 from limit_surface_ros.nodes import convert
 from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
+from limit_surface_ros.surface.dissipation import Dissipation
+from limit_surface_ros.surface.scaling import Scaling
 from node_helpers import Program, planar_twist, wrench_message
 
 CODES = {
@@ -235,19 +238,31 @@ def test_requests_of_a_million_rows_leave_no_memory_behind(ros, client_node, mod
     assert sizes[-1] - sizes[2] < 16_000
 
 
+@pytest.mark.parametrize("executor", ["single_threaded", "events"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_during_a_call_ends_the_node_cleanly(ros, client_node, model_file, number):
-    _, path = model_file()
-    with Program("limit_surface_node", "--ros-args", "-p", f"model_files:=['{path}']") as program:
+def test_a_signal_during_a_call_ends_the_node_cleanly_after_its_answer(
+    ros, client_node, tmp_path, number, executor
+):
+    # Slow, so that the signal comes while it is answered.
+    factors = np.random.default_rng(0).normal(size=(24, 3, 2))
+    surface = Dissipation(factors @ factors.transpose(0, 2, 1), Scaling(0.05, 2.0))
+    path = tmp_path / "slow.yaml"
+    write_surface_model(SurfaceModel(name="slow", surface=surface), path)
+    wrenches = np.random.default_rng(1).normal(size=(5_000, 3))
+    options = "-p", f"model_files:=['{path}']", "-p", f"executor:={executor}"
+    with Program("limit_surface_node", "--ros-args", *options) as program:
         name = "/limit_surface/wrenches_to_twists"
         client = client_node.create_client(WrenchesToTwists, name)
         assert client.wait_for_service(timeout_sec=20.0)
         idle = processor_ticks(program.process.pid)
-        flat = convert.flat_of(np.ones((1_000_000, 3)))
-        client.call_async(WrenchesToTwists.Request(wrenches=flat))
-        ros.wait(lambda: processor_ticks(program.process.pid) > idle + 20)
+        flat = convert.flat_of(wrenches)
+        answered = client.call_async(WrenchesToTwists.Request(wrenches=flat))
+        ros.wait(lambda: processor_ticks(program.process.pid) > idle + 10)
+        assert not answered.done()
         code, output = program.end(number)
     assert code == 0, output
+    assert ros.done(answered, 20.0)
+    assert len(answered.result().twists) == wrenches.size
     assert "Traceback" not in output
     assert "terminate" not in output
 

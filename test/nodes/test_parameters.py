@@ -32,8 +32,8 @@ def test_every_parameter_is_described(node, setting):
     for choice in setting.choices:
         assert choice in descriptor.additional_constraints
     if setting.minimum is not None:
-        assert descriptor.floating_point_range[0].from_value == setting.minimum
-        assert descriptor.floating_point_range[0].to_value == setting.maximum
+        (span,) = [*descriptor.floating_point_range, *descriptor.integer_range]
+        assert (span.from_value, span.to_value) == (setting.minimum, setting.maximum)
 
 
 @pytest.mark.parametrize("setting", TABLE, ids=lambda setting: setting.name)
@@ -51,6 +51,7 @@ def test_every_parameter_starts_at_its_default(node, setting):
         ("input_timeout", math.nan, "nan"),
         ("normal_force", math.inf, "inf"),
         ("normal_force", 0.0, "range"),
+        ("max_batch_rows", 0, "range"),
         ("normal_force_from", "moon", "model, wrench, parameter"),
         ("static_transforms", ["a b 1"], "accepted"),
         ("static_transforms", ["a b 0 0 nan 0 0 0"], "finite"),
