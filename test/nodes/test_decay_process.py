@@ -81,8 +81,10 @@ def test_a_bad_parameter_at_start_is_told_in_one_line(tmp_path, broken, told):
     assert "Traceback" not in output
 
 
-def test_both_nodes_serve_in_one_process_and_end_cleanly(ros, client_node):
-    with Program("force_motion_nodes") as program:
+@pytest.mark.parametrize("executor", ["single_threaded", "events"])
+def test_both_nodes_serve_in_one_process_and_end_cleanly(ros, client_node, executor):
+    given = "--ros-args", "-p", f"executor:={executor}"
+    with Program("force_motion_nodes", *given) as program:
         forward = ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
         evaluate = ros.client(client_node, EvaluateDecay, "/decay/evaluate")
         stop = ros.client(client_node, PredictStop, "/decay/predict_stop")
