@@ -135,7 +135,7 @@ class PlanarInputs:
 
         Raises:
             NotFiniteError: A number is NaN or infinite.
-            RangeError: A number is out of this world, or the friction is negative.
+            RangeError: A number is out of this world.
             FrameError: The frame is empty or no transform to the model's is known.
         """
         point = convert.vector_components("contact", request.contact.point)
@@ -147,8 +147,6 @@ class PlanarInputs:
             normal = transform.direction(normal).tolist()
             velocity = transform.direction(velocity).tolist()
         friction = convert.checked_number("friction", request.friction)
-        if friction < 0.0:
-            raise RangeError(f"friction must be 0 or above, got {friction:g}")
         return Contact(point[:2], normal[:2], friction, velocity[:2])
 
     def surface(self, model: SurfaceModel) -> LimitSurface:
