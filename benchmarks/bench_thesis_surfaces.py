@@ -51,7 +51,7 @@ from limit_surface_ros.surface.scaling import Scaling
 SCALING = Scaling(0.15, 1.0)
 CORNERS = np.array([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]])
 NOISE = 0.05
-STARTS = 32
+STARTS = 40
 MANY_STARTS = 200
 DRAWS = 5
 
