@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 # Relative width of the rim that counts as part of a cone of normals.
 RIM = 1e-12
-_NO_POWER = 1e-100
+_NO_POWER = 1e-60
 # Elements of one array of normals by corners, of which several stay in the processor's cache.
 _ELEMENTS = 2**14
 # Curvature below which a surface counts as flat beside a corner.

@@ -91,7 +91,7 @@ def motion_cone(
     contact = _Contact(surface, point, normal, friction)
     edges = contact.edges()
     return MotionCone(
-        np.array([contact.wrench(edge.angle) for edge in edges]),
+        np.array([contact.wrench(edge.angle, edge.twist) for edge in edges]),
         np.array([edge.twist for edge in edges]),
         np.array([edge.velocity for edge in edges]),
     )
@@ -133,7 +133,7 @@ def push(
     else:
         edge, mode = right, ContactMode.SLIDE_RIGHT
     speed = approach / float(edge.velocity @ contact.normal)
-    return Push(speed * edge.twist, mode, contact.wrench(edge.angle))
+    return Push(speed * edge.twist, mode, contact.wrench(edge.angle, edge.twist))
 
 
 class _Response(NamedTuple):
@@ -191,12 +191,15 @@ class _Contact:
         velocities = np.array([low.velocity, high.velocity])
         shares = np.linalg.lstsq(velocities.T, velocity, rcond=1e-9)[0]
         twist = shares @ np.array([low.twist, high.twist])
-        return Push(twist, ContactMode.STICK, self.wrench(0.5 * (low.angle + high.angle)))
+        return Push(twist, ContactMode.STICK, self.wrench(0.5 * (low.angle + high.angle), twist))
 
-    def wrench(self, angle: float) -> Floats:
-        """Return the wrench on the surface (3,) of a force at an angle."""
+    def wrench(self, angle: float, twist: Floats) -> Floats:
+        """Return the wrench on the surface (3,) of a force at an angle that causes a twist."""
         load = self._load(angle)
-        return np.array(load) / self._surface.load_factor(load)
+        factor = self._surface.load_factor(load)
+        # Beside a single support point a body turns freely under any force, however small: the
+        # twist alone says which one it needs.
+        return np.array(load) / factor if factor < np.inf else self._surface.wrench_of_twist(twist)
 
     def _respond(self, angle: float) -> _Response:
         twist = self._surface.twist_of_wrench(self._load(angle))

@@ -119,8 +119,9 @@ class SupportTable:
             else:
                 points = np.zeros_like(normals)
                 some = np.flatnonzero(certain)
-                found = self._prove(place.take(some, axis=1), cell.take(some))
-                points[:, some], certain[some] = found
+                if len(some):
+                    found = self._prove(place.take(some, axis=1), cell.take(some))
+                    points[:, some], certain[some] = found
         points *= sign
         return points, certain
 

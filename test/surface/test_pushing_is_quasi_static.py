@@ -73,6 +73,16 @@ def test_a_push_through_the_centre_of_friction_goes_straight():
     np.testing.assert_allclose(result.wrench, [3.0, 0.0, 0.0], atol=1e-9)
 
 
+@given(seed=seeds)
+def test_a_body_that_turns_freely_about_its_one_support_is_pushed_with_the_force_it_needs(seed):
+    rng = np.random.default_rng(seed)
+    support = PointContacts([[0.0, 0.0]], [1.0])
+    velocity = [0.1, rng.uniform(-0.05, 0.05)]
+    result = push(support, 0.05 * rng.standard_normal(2), [1.0, 0.0], 0.8, velocity)
+    needed = support.wrench_of_twist(result.twist)
+    assert result.wrench @ result.twist == pytest.approx(needed @ result.twist, rel=1e-7)
+
+
 def test_a_pusher_that_moves_away_leaves():
     result = push(SQUARE, [-0.05, 0.0], [1.0, 0.0], 0.3, [-0.02, 0.1])
     assert result.mode is ContactMode.SEPARATE

@@ -65,6 +65,30 @@ def test_many_vectors_are_answered_as_few_are(kind, seed):
     np.testing.assert_allclose(many, few, atol=1e-9 * np.abs(few).max())
 
 
+@pytest.mark.parametrize(
+    "kind", ["norms", "powers", "dissipation", "points", "many points", "polynomial"]
+)
+def test_single_vectors_are_answered_after_a_batch_as_before(kind):
+    surface, fresh = surface_of(kind, 7), surface_of(kind, 7)
+    vectors = np.random.default_rng(7).standard_normal((MANY, 3)) / [1.0, 1.0, 0.1]
+    inverse_map(surface)(vectors)
+    for vector in vectors[:FEW]:
+        one, pair = inverse_map(surface)(vector), inverse_map(surface)([vector, vector])
+        expected = inverse_map(fresh)(vector)
+        np.testing.assert_allclose(one, expected, atol=1e-9 * np.abs(expected).max())
+        np.testing.assert_allclose(pair[1], expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_a_corner_of_a_dissipation_model_is_answered_alone_after_a_batch():
+    points = PointContacts([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]], [0.5, 0.5, 0.5])
+    surface = points.dissipation()
+    surface.twist_of_wrench(np.random.default_rng(0).standard_normal((MANY, 3)) * [1, 1, 0.1])
+    facet = surface.wrench_of_twist([-0.04, 0.04, 1.0])
+    np.testing.assert_allclose(
+        surface.twist_of_wrench([facet, facet])[0], points.twist_of_wrench(facet), atol=1e-9
+    )
+
+
 @settings(max_examples=6, deadline=None)
 @given(seed=st.integers(0, 10_000))
 def test_the_twist_of_a_wrench_from_the_table_is_the_twist_asked_for(seed):
