@@ -12,12 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from limit_surface_ros.checks import as_positive
 from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.yaml_reader import Section, place_errors, read_yaml, write_yaml
-from limit_surface_ros.surface.convexity import warn_unless_convex
+from limit_surface_ros.surface.convexity import Convexity, is_convex, warn_unless_convex
 from limit_surface_ros.surface.dissipation import Dissipation
 from limit_surface_ros.surface.point_contacts import PointContacts
 from limit_surface_ros.surface.polynomial import Polynomial
@@ -66,6 +67,11 @@ class SurfaceModel:
                 raise RangeError(f"{key} must not be empty")
         if self.normal_force is not None:
             as_positive("normal_force", self.normal_force)
+
+    @cached_property
+    def convexity(self) -> Convexity:
+        """Whether the surface is convex: looked at once, when the model is read."""
+        return is_convex(self.surface)
 
 
 def _counted_matrices(section: Section) -> Any:
@@ -136,7 +142,7 @@ def read_surface_model(path: str | Path) -> SurfaceModel:
         fit=history.values,
     )
     section.finish()
-    warn_unless_convex(surface, model.name)
+    warn_unless_convex(model.convexity, model.name)
     return model
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -10,23 +9,15 @@ import yaml
 from limit_surface_interfaces.msg import DecayInfo, ModelInfo
 
 from limit_surface_ros.files.yaml_reader import plain
-from limit_surface_ros.surface.convexity import is_convex
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from limit_surface_ros.files.decay_file import DecayModel
     from limit_surface_ros.files.surface_file import SurfaceModel
-    from limit_surface_ros.surface.protocol import LimitSurface
 
 # What counts the terms of a kind, by the attribute that holds them.
 _TERMS = ("matrices", "points", "coefficients")
-
-
-# Where no theorem decides, thousands of directions are looked at: once for each surface.
-@functools.lru_cache(maxsize=64)
-def _is_convex(surface: LimitSurface) -> bool:
-    return is_convex(surface).convex
 
 
 def model_info(model: SurfaceModel, is_default: bool) -> ModelInfo:
@@ -43,7 +34,7 @@ def model_info(model: SurfaceModel, is_default: bool) -> ModelInfo:
         friction_force=scaling.friction_force,
         normal_force=math.nan if model.normal_force is None else model.normal_force,
         is_default=is_default,
-        convex=_is_convex(surface),
+        convex=model.convexity.convex,
         fit=_text(model.fit),
     )
 

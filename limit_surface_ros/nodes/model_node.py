@@ -240,6 +240,7 @@ class ModelNode(Node, Generic[Model]):
         )
 
     def _reload(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        start = time.perf_counter()
         try:
             self.values.renew([name for host in self._hosts for name in host.names])
             response.message = "; ".join(host.summary for host in self._hosts)
@@ -247,4 +248,5 @@ class ModelNode(Node, Generic[Model]):
             self.get_logger().info(response.message)
         except Exception as error:
             response.message = f"{self._refuse('reload', error)}; the old models keep serving"
+        self.health.times.add(time.perf_counter() - start)
         return response

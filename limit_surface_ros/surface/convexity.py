@@ -97,14 +97,13 @@ def is_convex(surface: LimitSurface) -> Convexity:
     )
 
 
-def warn_unless_convex(surface: LimitSurface, name: str) -> None:
+def warn_unless_convex(convexity: Convexity, name: str) -> None:
     """Warn, once for each name and place of call, if a surface is not convex.
 
     Args:
-        surface: The surface.
+        convexity: What `is_convex` says of the surface.
         name: What to call it in the warning.
     """
-    convexity = is_convex(surface)
     if not convexity.convex:
         warnings.warn(
             f"limit surface {name!r} is not convex: {convexity.reason}; there the wrench of the "

@@ -59,7 +59,7 @@ def test_a_surface_without_dents_but_without_a_theorem_is_not_called_proved():
 
 def test_a_dented_model_warns_with_its_share_and_a_convex_one_does_not():
     with pytest.warns(NotConvexWarning, match=r"'box' is not convex: .* % of the directions"):
-        warn_unless_convex(Polynomial(CROSS), "box")
+        warn_unless_convex(is_convex(Polynomial(CROSS)), "box")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        warn_unless_convex(Polynomial(SPHERE), "ball")
+        warn_unless_convex(is_convex(Polynomial(SPHERE)), "ball")
