@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -75,8 +76,11 @@ class Pushes:
         if value is None:
             return None
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not is_number or not 0.0 < value < math.inf:
-            raise FileError(f"{self.path}: line 1: {key} must be a number above 0, got {value!r}")
+        # An integer of JSON may be larger than any float.
+        if not is_number or not 0.0 < value <= sys.float_info.max:
+            raise FileError(
+                f"{self.path}: line 1: {key} must be a number above 0, got {value!r:.60}"
+            )
         return float(value)
 
     def support(self) -> tuple[Floats, Floats] | None:
@@ -91,10 +95,11 @@ class Pushes:
             return None
         try:
             places, forces = np.array(points, dtype=float), np.array(loads, dtype=float)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             places, forces = np.empty(0), np.empty(0)
         sound = places.ndim == 2 and places.shape == (forces.size, 2) and forces.size > 0
-        if not sound or not np.isfinite(places).all() or not (forces > 0.0).all():
+        finite = np.isfinite(places).all() and np.isfinite(forces).all()
+        if not sound or not finite or not (forces > 0.0).all():
             raise FileError(
                 f"{self.path}: line 1: support_points_m_body_frame must be points [x, y] and "
                 "support_loads_N one load above 0 for each"

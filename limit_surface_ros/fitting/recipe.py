@@ -51,6 +51,8 @@ FEWEST_PAIRS = 6
 _ROBUST_SCALE = 0.2
 # Share of a term that keeps it smooth; see `dissipation_parameters`.
 _FLOOR = 1e-3
+# Terms that sum up known support points, where there are more of them: those of a patch are many.
+_MOST_KNOWN = 8
 # Pairs that stand for the ellipsoid.
 _ELLIPSOID_PAIRS = 40
 # How much the usual pressure counts: little where nothing is known, much at known points.
@@ -66,7 +68,8 @@ class Recipe:
 
     Attributes:
         kind: "power_sum" of norms, or "dissipation", fitted on directions.
-        terms: How many terms at most; towards support points there is one for each of them.
+        terms: How many terms at most; towards support points there is one for each of them, or
+            eight that stand for them all where they are more.
         velocity_weight: Weight of the motions against the loads.
         towards: What the fit is held towards.
         strength: How much that counts: pushes' worth for the ellipsoid, for the others the
@@ -178,8 +181,9 @@ class Workbench:
         pairs, weight = self.scaled, recipe.velocity_weight
         if recipe.towards in _ENTROPY:
             contacts = self.pressure(recipe.towards, weight)
-            if recipe.towards == "pressure":
-                contacts = contacts.merged(recipe.terms)
+            contacts = contacts.merged(
+                recipe.terms if recipe.towards == "pressure" else _MOST_KNOWN
+            )
             matrices = contacts.matrices
             free = DissipationDirectionObjective(
                 pairs, len(matrices), weight, _ROBUST_SCALE, _FLOOR

@@ -27,7 +27,7 @@ _OVERLAP = 0.5
 _KNOWN_SIZE = 0.1
 # Smallest radius, in characteristic lengths: keeps a single point's resistance to turning.
 _SMALLEST = 1e-3
-# Share of all friction below which a contact is left out.
+# Share of the largest friction limit below which a contact is left out.
 _NEGLIGIBLE = 1e-3
 
 
@@ -99,7 +99,7 @@ class SmallContacts:
 
     def that_carry(self) -> SmallContacts:
         """Return those whose friction counts."""
-        carry = self.limits > _NEGLIGIBLE * self.limits.sum()
+        carry = self.limits > _NEGLIGIBLE * self.limits.max()
         return SmallContacts(self.points[carry], self.limits[carry], self.radii[carry])
 
     def merged(self, count: int) -> SmallContacts:
@@ -110,21 +110,26 @@ class SmallContacts:
         1963, doi:10.1080/01621459.1963.10500845).
         """
         points, limits, radii = self.points.copy(), self.limits.copy(), self.radii.copy()
-        while len(limits) > max(count, 1):
-            away = points[:, None] - points
-            shared = np.multiply.outer(limits, limits) / np.add.outer(limits, limits)
-            widening = shared * np.einsum("ijc,ijc->ij", away, away)
-            np.fill_diagonal(widening, np.inf)
+        kept = np.ones(len(limits), dtype=bool)
+        away = points[:, None] - points
+        shared = np.multiply.outer(limits, limits) / np.add.outer(limits, limits)
+        widening = shared * np.einsum("ijc,ijc->ij", away, away)
+        np.fill_diagonal(widening, np.inf)
+        for _ in range(len(limits) - max(count, 1)):
             first, second = divmod(int(widening.argmin()), len(limits))
             both = [first, second]
             total = limits[both].sum()
             moment = limits[both] @ radii[both] ** 2 + widening[first, second]
             points[first] = limits[both] @ points[both] / total
             limits[first], radii[first] = total, np.sqrt(moment / total)
-            points, limits, radii = (
-                np.delete(each, second, axis=0) for each in (points, limits, radii)
-            )
-        return SmallContacts(points, limits, radii)
+            kept[second] = False
+            # Only what is about these two changes: a patch has a thousand contacts.
+            away = points[first] - points
+            row = limits[first] * limits / (limits[first] + limits) * np.sum(away**2, axis=1)
+            row[~kept] = row[first] = np.inf
+            widening[first], widening[:, first] = row, row
+            widening[second], widening[:, second] = np.inf, np.inf
+        return SmallContacts(points[kept], limits[kept], radii[kept])
 
 
 def _rings() -> Floats:

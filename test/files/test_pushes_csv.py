@@ -87,3 +87,14 @@ def test_a_first_line_of_wrong_values_is_refused(tmp_path):
 def test_an_absent_file_is_named(tmp_path):
     with pytest.raises(FileError, match=r"none\.csv: cannot be read"):
         read_pushes(tmp_path / "none.csv")
+
+
+@pytest.mark.parametrize("digits", [400, 5000])
+def test_numbers_too_large_for_a_float_are_refused_with_file_and_line(tmp_path, digits):
+    huge = "1" + "0" * digits
+    with pytest.raises(FileError, match=r"pushes\.csv: line 1"):
+        read_pushes(written(tmp_path, f'# {{"rho_m": {huge}}}\n{NAMES}{ROW}')).number("rho_m")
+    about = '# {"support_points_m_body_frame": [[0, 0], [1, 0]], "support_loads_N": [1, %s]}\n'
+    for load in (huge, "1e999"):
+        with pytest.raises(FileError, match=r"pushes\.csv: line 1"):
+            read_pushes(written(tmp_path, about % load + NAMES + ROW)).support()

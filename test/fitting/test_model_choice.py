@@ -146,6 +146,14 @@ def test_given_support_points_are_used_unless_the_pushes_speak_against_them():
     assert choose_recipe(pushes, support=elsewhere).recipe.towards != "support"
 
 
+def test_the_many_support_points_of_a_patch_are_summed_up_in_eight_terms():
+    grid = np.stack(np.meshgrid(np.linspace(-0.1, 0.1, 40), np.linspace(-0.05, 0.05, 30)), axis=-1)
+    patch = PointContacts(grid.reshape(-1, 2), np.full(1200, 1e-3), Scaling(0.08, 1.2))
+    surface = fitted(random_loads(patch, 30, 0), Recipe(towards="support", strength=20.0), patch)
+    assert len(surface.matrices) == 8
+    assert np.degrees(mean_angle(surface, random_loads(patch, 300, 9))) < 3.0
+
+
 def test_what_cannot_be_chosen_is_refused():
     pushes = noisy_pushes(20)
     with pytest.raises(DataError, match="support points"):

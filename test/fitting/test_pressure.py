@@ -113,3 +113,9 @@ def test_known_points_are_scaled_to_the_pushes_and_those_without_load_left_out(s
     contacts = SmallContacts.at(known, scale_pairs(random_loads(BODY, 100, 0), BODY.scaling))
     np.testing.assert_allclose(contacts.points, BODY.points / 0.08)
     np.testing.assert_allclose(contacts.limits, BODY.friction_limits / 2.0, rtol=0.1)
+
+
+def test_many_equal_contacts_all_carry():
+    grid = np.stack(np.meshgrid(np.arange(40.0), np.arange(30.0)), axis=-1).reshape(-1, 2)
+    contacts = SmallContacts(grid, np.append(np.ones(1199), 1e-6), np.full(1200, 0.5))
+    assert len(contacts.that_carry().limits) == 1199
