@@ -58,7 +58,7 @@ class Search:
         RangeError: There is no start, or the seed is negative.
     """
 
-    starts: int = 16
+    starts: int = 32
     seed: int = 0
     executor: Executor | None = None
     progress: Progress | None = None
@@ -103,7 +103,8 @@ def descend(objective: Objective, start: Floats, precision: float = PRECISION) -
     """
     found = _minimum(objective, start, precision)
     return Descent(
-        cost=found.cost,
+        # NaN compares with nothing: it would win or hide among other starts.
+        cost=found.cost if math.isfinite(found.cost) else math.inf,
         parameters=found.parameters,
         iterations=found.iterations,
         evaluations=found.evaluations,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -115,7 +116,15 @@ def scale_pairs(pairs: Pairs, scaling: Scaling | None = None) -> ScaledPairs:
     directions = pairs.twists / scaling.twist_unit
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     wrenches = pairs.wrenches / scaling.wrench_unit
-    return ScaledPairs(np.round(wrenches, _DECIMALS), np.round(directions, _DECIMALS), scaling)
+    return ScaledPairs(_rounded(wrenches), np.round(directions, _DECIMALS), scaling)
+
+
+def _rounded(wrenches: Floats) -> Floats:
+    """Return scaled wrenches rounded, in parts of their size where a given scaling is far off."""
+    size = float(np.sqrt(np.mean(wrenches**2)))
+    # By a power of two, which keeps every digit; scalings chosen from the pairs need none.
+    unit = 1.0 if 0.01 < size < 100.0 or size == 0.0 else 2.0 ** round(math.log2(size))
+    return np.asarray(np.round(wrenches / unit, _DECIMALS) * unit)
 
 
 def check_support(pairs: ScaledPairs, parameters: int) -> None:

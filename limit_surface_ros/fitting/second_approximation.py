@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.checks import as_floats
-from limit_surface_ros.errors import RangeError
+from limit_surface_ros.errors import RangeError, SolverError
 from limit_surface_ros.fitting.cholesky import (
     PARAMETERS_PER_MATRIX,
     factors_of,
@@ -30,6 +30,7 @@ from limit_surface_ros.fitting.multi_start import Search, descend, descents
 from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
 from limit_surface_ros.fitting.result import FitResult, errors_on
 from limit_surface_ros.fitting.scaled_pairs import check_support, scale_pairs
+from limit_surface_ros.fitting.solve import is_sound
 from limit_surface_ros.surface.power_sum import PowerSum, thesis_exponents
 
 if TYPE_CHECKING:
@@ -57,7 +58,8 @@ class SecondObjective:
         self._velocity_weight = velocity_weight
         loads = pairs.wrenches
         self._monomials = loads[:, _ROWS] * loads[:, _COLUMNS] * _TWICE
-        self._inverse = np.linalg.pinv(self._monomials)
+        shares = np.sqrt(pairs.weights)
+        self._inverse = np.linalg.pinv(shares[:, None] * self._monomials) * shares
 
     @property
     def size(self) -> int:
@@ -73,6 +75,7 @@ class SecondObjective:
     def cost_and_gradient(self, parameters: Floats) -> tuple[float, Floats]:
         """Return the cost and its gradient, shape (6,)."""
         loads, directions = self._pairs.wrenches, self._pairs.directions
+        weights = self._pairs.weights
         factors = factors_of(parameters)
         products = loads @ matrices_of(factors)[0]
         roots = np.sqrt(np.maximum(np.einsum("nc,nc->n", products, loads), _LEAST))
@@ -83,17 +86,18 @@ class SecondObjective:
         units = gradient / norms[:, None]
         cosines = np.einsum("nc,nc->n", units, directions)
         loss, slope = direction_loss(cosines, None)
-        cost = residual @ residual + self._velocity_weight * loss.sum()
-        slope *= self._velocity_weight / norms
+        weighted = weights * residual
+        cost = weighted @ residual + self._velocity_weight * (weights @ loss)
+        slope *= self._velocity_weight * weights / norms
         pull = slope[:, None] * (directions - cosines[:, None] * units)
         # What A feels of the cost comes back through its dependence on the roots.
-        of_inner = self._monomials.T @ (2.0 * residual)
+        of_inner = self._monomials.T @ (2.0 * weighted)
         outer = 2.0 * pull.T @ loads
         of_inner += 0.5 * (outer + outer.T)[_ROWS, _COLUMNS] * _TWICE
-        of_roots = 2.0 * residual - of_inner @ self._inverse
+        of_roots = 2.0 * weighted - of_inner @ self._inverse
         of_roots -= np.einsum("nc,nc->n", pull, products) / roots**2
-        weighted = (0.5 * of_roots / roots)[:, None] * loads + pull / roots[:, None]
-        return float(cost), parameter_gradient((weighted.T @ loads)[None], factors)
+        of_matrix = ((0.5 * of_roots / roots)[:, None] * loads + pull / roots[:, None]).T @ loads
+        return float(cost), parameter_gradient(of_matrix[None], factors)
 
     def start(self, rng: np.random.Generator) -> Floats:
         """Return a random B that takes half of H on average."""
@@ -126,8 +130,8 @@ def fit_second_approximation(
 ) -> FitResult:
     """Fit two terms by the second approximation.
 
-    The result's details give the projected cost, and the least eigenvalue of A as least squares
-    had it.
+    Start costs are those of the projected problem. The result's details give the best of them,
+    and the least eigenvalue of A as least squares had it.
 
     Args:
         pairs: Loads on the surface and the motions they cause, 12 at least.
@@ -138,6 +142,7 @@ def fit_second_approximation(
     Raises:
         RangeError: The weight is negative.
         DataError: The pairs cannot determine such a surface.
+        SolverError: The surface does not pass through the loads.
     """
     weight = float(as_floats("velocity_weight", velocity_weight))
     if weight < 0.0:
@@ -150,19 +155,21 @@ def fit_second_approximation(
     best = found[0]
     outer = matrices_of(factors_of(best.parameters))[0]
     least = float(np.linalg.eigvalsh(objective.inner_matrix(outer))[0])
-    surface, cost = objective.surface(best.parameters), best.cost
+    surface, end, iterations = objective.surface(best.parameters), best, best.iterations
     if least < 0.0:
         both = PowerSumObjective(scaled, thesis_exponents(2), weight)
-        polished = descend(both, parameters_of(factors_of_matrices(surface.matrices)))
-        surface, cost = both.surface(polished.parameters), polished.cost
+        end = descend(both, parameters_of(factors_of_matrices(surface.matrices)))
+        surface, iterations = both.surface(end.parameters), iterations + end.iterations
+    if not is_sound(surface, pairs):
+        raise SolverError("the second approximation does not pass through the loads")
     return FitResult(
         surface=surface,
         objective=f"second approximation, velocity weight {weight:g}",
-        cost=cost,
+        cost=end.cost,
         start_costs=tuple(each.cost for each in found),
-        iterations=best.iterations,
-        gradient_norm=best.gradient_norm,
-        converged=best.converged,
+        iterations=iterations,
+        gradient_norm=end.gradient_norm,
+        converged=end.converged,
         wall_time=time.perf_counter() - begin,
         training=errors_on(surface, pairs),
         details={"projected_cost": best.cost, "least_eigenvalue_of_A": least},

@@ -99,7 +99,7 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
     fit.add_argument(
         "--starts",
         type=int,
-        default=16,
+        default=Search.starts,
         help="starts at most, half of them random, the others near the best so far (%(default)s)",
     )
     fit.add_argument("--seed", type=int, default=0, help="of all that is random (%(default)s)")

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from limit_surface_ros.errors import DataError, RangeError
+from limit_surface_ros.fitting.cholesky import factors_of_matrices, parameters_of
 from limit_surface_ros.fitting.multi_start import Search
 from limit_surface_ros.fitting.polynomial import fit_polynomial
 from limit_surface_ros.fitting.power_sum import fit_power_sum
+from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
 from limit_surface_ros.fitting.scaled_pairs import scale_pairs
 from limit_surface_ros.fitting.second_approximation import (
     SecondObjective,
@@ -58,7 +60,8 @@ def test_polynomials_need_fifteen_pairs_and_a_weight_that_is_not_negative():
 
 @pytest.mark.parametrize("weight", [0.0, 1.0])
 def test_the_projected_gradient_agrees_with_finite_differences(weight):
-    objective = SecondObjective(scale_pairs(random_motions(TRIANGLE, 60, 0), SCALING), weight)
+    pairs = scale_pairs(random_motions(TRIANGLE, 60, 0), SCALING)
+    objective = SecondObjective(pairs.weighted(np.linspace(0.5, 2.0, 60)), weight)
     start = objective.start(np.random.default_rng(3))
     _, gradient = objective.cost_and_gradient(start)
     numeric = [
@@ -81,6 +84,22 @@ def test_the_second_approximation_is_positive_semidefinite_and_near_the_full_fit
     full = fit_power_sum(pairs, thesis_exponents(2), velocity_weight=weight, scaling=SCALING)
     assert np.linalg.eigvalsh(second.surface.matrices).min() >= -1e-12
     assert full.cost <= second.cost * 1.01 < 4 * full.cost
+
+
+def test_a_part_of_the_pairs_stands_for_all_of_them():
+    objective = SecondObjective(scale_pairs(simulated_pairs(TRIANGLE), SCALING), 1.0)
+    start = objective.start(np.random.default_rng(0))
+    whole, part = (each.cost_and_gradient(start)[0] for each in (objective, objective.coarse()))
+    assert part == pytest.approx(whole, rel=0.3)
+
+
+def test_what_is_told_of_the_end_of_a_second_approximation_is_of_the_surface_returned():
+    pairs = simulated_pairs(TRIANGLE, 300, 20)
+    found = fit_second_approximation(pairs, scaling=SCALING, search=Search(8))
+    scaled = scale_pairs(pairs, SCALING)
+    both = PowerSumObjective(scaled, thesis_exponents(2), 1.0)
+    factors = parameters_of(factors_of_matrices(found.surface.matrices))
+    assert both.cost(factors) == pytest.approx(found.cost, rel=1e-6)
 
 
 def test_noise_is_of_the_size_that_is_asked_for():

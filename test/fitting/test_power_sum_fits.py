@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from limit_surface_ros.errors import DataError, RangeError
-from limit_surface_ros.fitting.multi_start import Search, process_pool
+from limit_surface_ros.fitting.multi_start import Search, descents, process_pool
 from limit_surface_ros.fitting.power_sum import fit_power_sum
 from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
 from limit_surface_ros.fitting.scaled_pairs import ScaledPairs, scale_pairs
@@ -203,3 +203,38 @@ def test_a_negative_weight_or_no_start_is_refused():
         fit_power_sum(triangle_pairs(40, 1), [1.0], velocity_weight=-1.0)
     with pytest.raises(RangeError, match="starts"):
         Search(0)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-7, 1e7])
+def test_loads_far_from_a_given_scaling_keep_their_digits(size):
+    pairs = triangle_pairs(150, 10)
+    usual = scale_pairs(pairs, SCALING).wrenches
+    found = scale_pairs(Pairs(pairs.wrenches * size, pairs.twists), SCALING).wrenches
+    np.testing.assert_allclose(found / size, usual, atol=1e-8)
+
+
+class Pitted:
+    """An objective that some starts leave with a cost that is no number."""
+
+    size = 1
+
+    def cost_and_gradient(self, parameters):
+        cost = np.nan if parameters[0] < 0.0 else 1.0 + parameters[0] ** 2
+        return cost, 2.0 * parameters
+
+    def start(self, rng):
+        return rng.normal(size=1)
+
+    def start_near(self, parameters, rng):
+        return rng.normal(size=1)
+
+    def coarse(self):
+        return None
+
+
+def test_a_cost_that_is_no_number_comes_last():
+    costs = [each.cost for each in descents(Pitted(), Search(12))]
+    assert np.isfinite(costs[0])
+    assert not np.isnan(costs).any()
+    assert costs == sorted(costs)
+    assert np.isinf(costs[-1])
