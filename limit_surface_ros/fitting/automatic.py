@@ -13,6 +13,7 @@ from limit_surface_ros.fitting.multi_start import Search
 from limit_surface_ros.fitting.result import FitResult, errors_on
 
 if TYPE_CHECKING:
+    from limit_surface_ros.fitting.multi_start import Progress
     from limit_surface_ros.surface.pairs import Pairs
     from limit_surface_ros.surface.point_contacts import PointContacts
     from limit_surface_ros.surface.scaling import Scaling
@@ -50,7 +51,7 @@ def fit_automatically(
         support=support,
         seed=search.seed,
         executor=search.executor,
-        progress=search.progress,
+        progress=_from(search.progress, 0, folds + refits),
     )
     descent = choice.descent
     details: dict[str, Any] = {
@@ -69,6 +70,7 @@ def fit_automatically(
             support=support,
             seed=search.seed,
             executor=search.executor,
+            progress=_from(search.progress, folds, folds + refits),
         )
         details["bootstrap"] = stored_surfaces(surfaces)
     return FitResult(
@@ -83,3 +85,10 @@ def fit_automatically(
         training=errors_on(choice.surface, pairs),
         details=details,
     )
+
+
+def _from(progress: Progress | None, before: int, total: int) -> Progress | None:
+    """Return what tells of a part of the work: so much is done before it, of so much in all."""
+    if progress is None:
+        return None
+    return lambda done, _: progress(before + done, total)

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.fitting.multi_start import Progress
     from limit_surface_ros.fitting.recipe import Recipe
     from limit_surface_ros.surface.pairs import Pairs
     from limit_surface_ros.surface.point_contacts import PointContacts
@@ -39,6 +40,7 @@ def bootstrap(
     support: PointContacts | None = None,
     seed: int = 0,
     executor: Executor | None = None,
+    progress: Progress | None = None,
 ) -> tuple[LimitSurface, ...]:
     """Return the surfaces of `count` refits by one recipe.
 
@@ -50,6 +52,7 @@ def bootstrap(
         support: Known support points, for recipes held towards them.
         seed: Of weights and random starts.
         executor: Where refits run; here and one by one if not given.
+        progress: Called with (refits done, refits in all) after each.
 
     Raises:
         RangeError: `count` is below 2.
@@ -62,11 +65,16 @@ def bootstrap(
     weights /= weights.mean(axis=1, keepdims=True)
     tasks = [(Workbench(pairs, scaling, support, each, seed), recipe) for each in weights]
     if executor is None:
-        found = [_refit(*task) for task in tasks]
+        found = (_refit(*task) for task in tasks)
     else:
         futures = [executor.submit(_refit, *task) for task in tasks]
-        found = [future.result() for future in futures]
-    surfaces = tuple(surface for surface in found if surface is not None)
+        found = (future.result() for future in futures)
+    surfaces: tuple[LimitSurface, ...] = ()
+    for done, surface in enumerate(found, start=1):
+        if surface is not None:
+            surfaces += (surface,)
+        if progress is not None:
+            progress(done, count)
     if len(surfaces) < 2:
         raise SolverError(f"no refits by {recipe} pass through the loads")
     return surfaces

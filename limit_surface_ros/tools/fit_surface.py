@@ -113,7 +113,7 @@ def run(options: argparse.Namespace) -> None:
     """Read, fit, write, report."""
     name = model_name(options.output, options.name)
     refuse_options_of_others(options)
-    parts = "folds" if options.auto else "starts"
+    parts = "fits" if options.auto else "starts"
     with process_pool(options.workers) as executor, progress_bar(parts) as progress:
         fitted = fit_model(options.input, name, options, executor, progress)
     command = shlex.join(["fit_surface", *options.command])

@@ -12,6 +12,7 @@ from limit_surface_ros.fitting.bootstrap import (
     twist_spread,
 )
 from limit_surface_ros.fitting.model_choice import choose_recipe, default_candidates
+from limit_surface_ros.fitting.multi_start import Search
 from limit_surface_ros.fitting.recipe import Recipe, Workbench
 from limit_surface_ros.surface.convexity import is_convex
 from limit_surface_ros.surface.dissipation import Dissipation
@@ -166,3 +167,10 @@ def test_what_cannot_be_chosen_is_refused():
         choose_recipe(pushes, folds=1000)
     with pytest.raises(RangeError, match="only dissipation"):
         Recipe("power_sum", towards="support")
+
+
+def test_choice_and_bootstrap_tell_of_their_progress_as_one():
+    seen = []
+    search = Search(progress=lambda done, total: seen.append((done, total)))
+    fit_automatically(noisy_pushes(15), folds=3, refits=4, search=search)
+    assert seen == [(done, 7) for done in range(1, 8)]
