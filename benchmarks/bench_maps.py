@@ -29,6 +29,8 @@ SCALING = Scaling(0.1, 5.0)
 SIZES = (100, 1_000, 10_000, 100_000, 1_000_000)
 # Vectors after which a map that searches has made its table.
 TABLE = 10_000
+# Size of the batch at which ours stands beside the ellipsoid.
+COMPARED = 10_000
 # Longest batch [s].
 PATIENCE = 1.5
 MAPS = {"wrench -> twist": "twist_of_wrench", "twist -> wrench": "wrench_of_twist"}
@@ -86,26 +88,35 @@ def times_by_size() -> None:
         f"One thread. Batches that would take more than {PATIENCE:g} s are left out. The maps "
         "that have to search keep a table once they were asked for much; it is there already.\n"
     )
-    print(f"| kind | map | alone [us] | {' | '.join(f'{n:.0e} [ns]' for n in SIZES)} | goals |")
-    print(f"|---|---|---|{'---|' * len(SIZES)}---|")
+    print(
+        f"| kind | map | alone [us] | {' | '.join(f'{n:.0e} [ns]' for n in SIZES)} "
+        "| times the ellipsoid, 1e+04 | goals |"
+    )
+    print(f"|---|---|---|{'---|' * len(SIZES)}---|---|")
     rng = np.random.default_rng(0)
     rows = rng.standard_normal((SIZES[-1], 3)) * [1.0, 1.0, 0.1]
-    for (name, map_name), call in ways().items():
+    *all_of_ours, peer = ways().items()
+    for (name, map_name), call in (*all_of_ours, peer):
         call(rows[:TABLE])
         one = rows[0].copy()
         alone = interleaved({"one": lambda c=call, r=one: c(r)})["one"]
-        cells, each = [], alone
+        cells, each, ratio = [], alone, ""
         for size in SIZES:
             if each * size > PATIENCE:
                 cells.append("")
                 continue
             batch = rows[:size]
             rounds = 9 if size < SIZES[-1] else 3
-            each = interleaved({"all": lambda c=call, r=batch: c(r)}, rounds)["all"] / size
+            turns = {"ours": lambda c=call, r=batch: c(r), "peer": lambda r=batch: peer[1](r)}
+            times = interleaved(turns, rounds)
+            each = times["ours"] / size
             cells.append(f"{each * 1e9:.3g}")
+            if size == COMPARED:
+                ratio = f"{times['ours'] / times['peer']:.3g}"
         goal = GOALS.get((name, map_name), "")
         print(
-            f"| {name} | {map_name} | {alone * 1e6:.3g} | {' | '.join(cells)} | {goal} |",
+            f"| {name} | {map_name} | {alone * 1e6:.3g} | {' | '.join(cells)} | {ratio} "
+            f"| {goal} |",
             flush=True,
         )
     print()

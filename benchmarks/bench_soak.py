@@ -61,7 +61,9 @@ class Load:
         calls = self._pool.submit(
             soak_load.call, prefix, seconds, period, CLIENTS, self._model_file if ours else None
         )
-        stream = self._pool.submit(soak_load.stream, prefix, seconds)
+        stream = self._pool.submit(
+            soak_load.stream, prefix, seconds, self._model_file if ours else None
+        )
         warm_up = min(WARM_UP, seconds / 4)
         time.sleep(warm_up)
         start, used, before = time.perf_counter(), processor_seconds(node.pid), resident(node.pid)
@@ -92,10 +94,11 @@ def soak(load: Load, prefix: str, node: subprocess.Popen[bytes], seconds: float)
     print(f"| reloads | {calls.reloads} | |")
     print(f"| good wrenches sent / answered | {stream.sent} / {stream.answered} | |")
     print(f"| bad wrenches sent / answered | {stream.bad} / {stream.unasked} | 0 answered |")
+    print(f"| twists on the topic that differ from the library | {stream.wrong} | 0 |")
     print(f"| topic path p50 / p99 [ms] | {milliseconds(stream.delays)} | p99 < 5 |")
     print(f"| resident memory [MB] | {before / 1e3:.1f} -> {after / 1e3:.1f} ", end="")
     print(f"({(after / before - 1) * 100:+.2f} %) | < 1 % |")
-    return alive and not (calls.lost or calls.wrong or stream.unasked)
+    return alive and not (calls.lost or calls.wrong or stream.wrong or stream.unasked)
 
 
 def main() -> int:
@@ -124,7 +127,7 @@ def main() -> int:
         for name, period in LOADS.items():
             for node, (prefix, running) in nodes.items():
                 stream, calls, used, _ = load.run(prefix, running, period, ROW_SECONDS)
-                right = right and not (calls.lost or calls.wrong)
+                right = right and not (calls.lost or calls.wrong or stream.wrong)
                 print(f"| {name} | {node} | {len(calls.times) / ROW_SECONDS:.0f} ", end="")
                 print(f"| {stream.answered / stream.sent:.1%} ", end="")
                 print(f"| {milliseconds(stream.delays)} | {milliseconds(calls.times)} ", end="")

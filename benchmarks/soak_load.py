@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from rclpy.node import Node
 
 RATE = 1000.0
+# What is sent; it makes the body slide.
+WRENCH = (2.0, 1.0, 0.05)
 # One wrench in so many is bad.
 BAD = 100
 # After so long an answer counts as lost [s].
@@ -47,6 +49,7 @@ class Stream:
         bad: Bad ones.
         answered: Good wrenches whose twist came.
         unasked: Twists that answer no good wrench.
+        wrong: Twists that differ from the library's.
         delays: From sending a good wrench to its twist [s].
     """
 
@@ -54,6 +57,7 @@ class Stream:
     bad: int = 0
     answered: int = 0
     unasked: int = 0
+    wrong: int = 0
     delays: list[float] = field(default_factory=list)
 
 
@@ -88,10 +92,15 @@ def _spinning(name: str, seconds: float) -> Iterator[Node]:
         node.destroy_node()
 
 
-def stream(prefix: str, seconds: float) -> Stream:
-    """Send wrenches at a steady rate, one in a hundred of them bad, and time the twists."""
+def stream(prefix: str, seconds: float, model_file: str | None) -> Stream:
+    """Send wrenches at a steady rate, one in a hundred of them bad, and time the twists.
+
+    The twists are held against those of the library if there is a model file.
+    """
     seen = Stream()
     due: dict[tuple[int, int], float] = {}
+    surface = read_surface_model(model_file).surface if model_file else None
+    expected = None if surface is None else surface.twist_of_wrench(WRENCH)
 
     def take(message: TwistStamped) -> None:
         stamp = message.header.stamp
@@ -100,11 +109,15 @@ def stream(prefix: str, seconds: float) -> Stream:
             seen.unasked += 1
         else:
             seen.answered += 1
+            if expected is not None:
+                found = message.twist
+                twist = [found.linear.x, found.linear.y, found.angular.z]
+                seen.wrong += not np.allclose(twist, expected, rtol=1e-9, atol=1e-9)
             seen.delays.append(time.perf_counter() - start)
 
     def send() -> None:
         number = seen.sent + seen.bad
-        message = wrench_message([2.0, 1.0, 0.05])
+        message = wrench_message(WRENCH)
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(number, 1000)
         if number % BAD == BAD - 1:
             message.wrench.force.x = math.nan
