@@ -99,3 +99,16 @@ def test_both_nodes_serve_in_one_process_and_end_cleanly(ros, client_node, execu
         code, output = program.end()
     assert code == 0, output
     assert "Traceback" not in output
+
+
+def test_topics_of_both_nodes_are_renamed_apart_by_the_rules_of_the_launch_file(ros, client_node):
+    rules = "-r", "limit_surface:~/wrench:=/ft", "-r", "decay:~/onset:=/lost"
+    with Program("force_motion_nodes", "--ros-args", "-r", "__ns:=/left", *rules) as program:
+
+        def topics():
+            return {name for name, _ in client_node.get_topic_names_and_types()}
+
+        kept = {"/left/limit_surface/twist", "/left/decay/wrench", "/left/decay/measurement"}
+        ros.wait(lambda: {"/ft", "/lost"} | kept <= topics())
+        assert not {"/left/limit_surface/wrench", "/left/decay/onset"} & topics()
+        assert program.end()[0] == 0
