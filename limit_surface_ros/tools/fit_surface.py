@@ -36,6 +36,7 @@ EXAMPLES = """examples:
 """
 
 OF_CONTACTS = ("motions", "facet_loads", "load_noise", "motion_noise")
+CHOSEN_BY_AUTO = ("kind", "terms", "family", "objective", "velocity_weight", "starts")
 OF_BAGS = ("wrench_topic", "motion_topic", *asdict(Selection()))
 
 
@@ -101,7 +102,9 @@ def refuse_options_of_others(options: argparse.Namespace) -> None:
         refuse_unused(top, options, ["rows"], "for a CSV of pushes")
     if not is_bag(options.input):
         refuse_unused(top, options, OF_BAGS, "for a bag")
-    if not options.auto:
+    if options.auto:
+        refuse_unused(top, options, CHOSEN_BY_AUTO, "what --auto chooses")
+    else:
         refuse_unused(top, options, ["folds", "support"], "for --auto")
         if options.kind != "power_sum":
             refuse_unused(top, options, ["family"], "for --kind power_sum")

@@ -130,6 +130,8 @@ def test_the_automatic_fit_stores_its_choice_and_its_bootstrap(pushes, tmp_path)
         (["--wrench-topic", "/w"], "--wrench-topic does nothing here: it is for a bag"),
         (["--kind", "dissipation", "--family", "norms"], "it is for --kind power_sum"),
         (["--folds", "3"], "it is for --auto"),
+        (["--auto", "--terms", "4"], "--terms does nothing here: it is what --auto chooses"),
+        (["--auto", "--kind", "dissipation"], "--kind does nothing here"),
         (["--characteristic-length", "0"], "must be"),
         (["--name", ""], "--name must not be empty"),
         (["--output", "model.txt"], "must end in .yaml or .yml"),
