@@ -100,23 +100,24 @@ def _climb(terms: Sequence[Term], twist: Vector, start: Vector) -> Vector | None
     return None
 
 
-def _in_plane(term: Term, normal: Vector, first: Vector, second: Vector) -> tuple[float, ...]:
+def _in_plane(
+    term: Term, normal: Vector, first: Vector, second: Vector
+) -> tuple[float, float, float, float, float, float]:
     """Return q0, b1, b2, a11, a12, a22 of a term's form in the plane."""
     _, _, a, b, c, d, e, f, g, h, i = term
-    images = [
-        (a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z)
-        for x, y, z in (normal, first, second)
-    ]
-    return tuple(
-        u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
-        for u, v in (
-            (images[0], images[0]),
-            (images[0], images[1]),
-            (images[0], images[2]),
-            (images[1], images[1]),
-            (images[1], images[2]),
-            (images[2], images[2]),
-        )
+    x, y, z = normal
+    n0, n1, n2 = a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
+    x, y, z = first
+    p0, p1, p2 = a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
+    x, y, z = second
+    q0, q1, q2 = a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
+    return (
+        n0 * n0 + n1 * n1 + n2 * n2,
+        n0 * p0 + n1 * p1 + n2 * p2,
+        n0 * q0 + n1 * q1 + n2 * q2,
+        p0 * p0 + p1 * p1 + p2 * p2,
+        p0 * q0 + p1 * q1 + p2 * q2,
+        q0 * q0 + q1 * q1 + q2 * q2,
     )
 
 
