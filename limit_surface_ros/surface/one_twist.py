@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.surface.one_load import Term, Vector
 
+    # q0, b1, b2, a11, a12 and a22: in the plane a form is q0 + 2 b.x + x'a x.
+    Form: TypeAlias = tuple[float, float, float, float, float, float]
     Newton: TypeAlias = tuple[float, tuple[float, float], tuple[float, float]]
 
 _STEPS = 30
@@ -65,7 +67,6 @@ def _climb(terms: Sequence[Term], twist: Vector, start: Vector) -> Vector | None
     along = start[0] * nx + start[1] * ny + start[2] * nz
     p = (start[0] * first[0] + start[1] * first[1] + start[2] * first[2]) / along
     q = (start[0] * second[0] + start[1] * second[1] + start[2] * second[2]) / along
-    # In the plane a form is q0 + 2 (b1 p + b2 q) + a11 p^2 + 2 a12 p q + a22 q^2.
     forms = [_in_plane(term, (nx, ny, nz), first, second) for term in terms]
     norms = all(term[0] == 0.5 for term in terms)
     previous = float("inf")
@@ -100,10 +101,8 @@ def _climb(terms: Sequence[Term], twist: Vector, start: Vector) -> Vector | None
     return None
 
 
-def _in_plane(
-    term: Term, normal: Vector, first: Vector, second: Vector
-) -> tuple[float, float, float, float, float, float]:
-    """Return q0, b1, b2, a11, a12, a22 of a term's form in the plane."""
+def _in_plane(term: Term, normal: Vector, first: Vector, second: Vector) -> Form:
+    """Return a term's form in the plane."""
     _, _, a, b, c, d, e, f, g, h, i = term
     x, y, z = normal
     n0, n1, n2 = a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
@@ -121,12 +120,12 @@ def _in_plane(
     )
 
 
-def _value(form: tuple[float, ...], p: float, q: float) -> float:
+def _value(form: Form, p: float, q: float) -> float:
     q0, b1, b2, a11, a12, a22 = form
     return q0 + p * (2.0 * b1 + a11 * p + 2.0 * a12 * q) + q * (2.0 * b2 + a22 * q)
 
 
-def _norms_newton(forms: list[tuple[float, ...]], p: float, q: float) -> Newton | None:
+def _norms_newton(forms: list[Form], p: float, q: float) -> Newton | None:
     """Return what `_newton` does where all exponents are 1/2, so that g is a sum of roots."""
     gauge = g1 = g2 = h11 = h12 = h22 = 0.0
     for q0, b1, b2, a11, a12, a22 in forms:
@@ -148,9 +147,7 @@ def _norms_newton(forms: list[tuple[float, ...]], p: float, q: float) -> Newton 
     return None if move is None else (log(gauge), (g1 / gauge, g2 / gauge), move)
 
 
-def _newton(
-    terms: Sequence[Term], forms: list[tuple[float, ...]], p: float, q: float
-) -> Newton | None:
+def _newton(terms: Sequence[Term], forms: list[Form], p: float, q: float) -> Newton | None:
     """Return log g, its gradient, and Newton's move for g; see `PowerGauge`."""
     values = [_value(form, p, q) for form in forms]
     for value, form in zip(values, forms, strict=True):
