@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.surface.pairs import Pairs
     from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.surface.scaling import Scaling
 
 
 def velocity_error(surface: LimitSurface, pairs: Pairs) -> Floats:
@@ -76,17 +77,23 @@ def force_error(surface: LimitSurface, reference: LimitSurface, directions: Arra
     return np.asarray(np.linalg.norm((wrenches - exact) / unit, axis=-1))
 
 
-def load_error(surface: LimitSurface, pairs: Pairs) -> Floats:
+def load_error(surface: LimitSurface, pairs: Pairs, scaling: Scaling | None = None) -> Floats:
     """Return |f - f^|: the pairs' wrenches against the model's for their twists.
 
     For data of which the twist is known better than the wrench; where a twist belongs to a facet
     of the surface, many loads cause it and the error is that of the one the model names.
 
+    Args:
+        surface: The model.
+        pairs: The data.
+        scaling: In whose scaled variables; the model's if not given.
+
     Returns:
-        Shape (n,), in parts of the model's friction force scale.
+        Shape (n,), in parts of the friction force scale.
     """
     difference = pairs.wrenches - surface.wrench_of_twist(pairs.twists)
-    return np.asarray(np.linalg.norm(difference / surface.scaling.wrench_unit, axis=1))
+    unit = (scaling or surface.scaling).wrench_unit
+    return np.asarray(np.linalg.norm(difference / unit, axis=1))
 
 
 def quantiles(errors: ArrayLike, levels: Sequence[float] = (0.5, 0.95, 1.0)) -> Floats:

@@ -1,8 +1,10 @@
 """Compare surfaces on data: model files, and kinds that are fitted on the spot.
 
 Prints one row for each: its size, the quantiles of the error of motion |v - v^| of unit twists,
-the mean angle, the time of its fit and of its two maps. Data are a contact file, recorded pushes,
-or a bag; with rows held out, models are judged on those alone.
+the mean angle, the quantiles of the error of load |f - f^| in parts of the loads' size, the spread
+of the motions among the refits of a bootstrap where the model has one, and the time of its fit and
+of its two maps. Data are a contact file, recorded pushes, or a bag; with rows held out, models are
+judged on those alone.
 """
 
 from __future__ import annotations
@@ -11,23 +13,26 @@ import argparse
 import copy
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from limit_surface_ros.errors import DataError, LimitSurfaceError, RangeError
 from limit_surface_ros.files.surface_file import read_surface_model
+from limit_surface_ros.fitting.bootstrap import surfaces_of, twist_spread
 from limit_surface_ros.fitting.multi_start import Search, process_pool
 from limit_surface_ros.fitting.result import errors_on
+from limit_surface_ros.fitting.scaled_pairs import scaling_of_pairs
 from limit_surface_ros.fitting.worker_processes import available_cores
-from limit_surface_ros.surface.measures import velocity_error
+from limit_surface_ros.surface.measures import load_error, quantiles, velocity_error
 from limit_surface_ros.tools.program import run_program
 from limit_surface_ros.tools.progress import progress_bar
 from limit_surface_ros.tools.surface_fit import add_fit_options, fit, read_input
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.surface.pairs import Pairs
@@ -46,6 +51,10 @@ HEADINGS = (
     "v 95 %",
     "v 100 %",
     "angle [deg]",
+    "f 50 %",
+    "f 95 %",
+    "f 100 %",
+    "spread [deg]",
     "fit [s]",
     "wrench->twist [us]",
     "twist->wrench [us]",
@@ -124,16 +133,48 @@ def microseconds_each(function: Callable[[Floats], Floats], vectors: Floats) -> 
     return 1e6 * min(times) / len(vectors)
 
 
-def row_of(name: str, surface: LimitSurface, test: Pairs, fit_time: float | None) -> list[str]:
+@dataclass(frozen=True)
+class Compared:
+    """A surface among those that are compared.
+
+    Attributes:
+        name: Of its row.
+        surface: The surface.
+        fit_time: What its fit took [s], if that is known.
+        bootstrap: Its refits as `stored_surfaces` keeps them, if there are any.
+    """
+
+    name: str
+    surface: LimitSurface
+    fit_time: float | None
+    bootstrap: Mapping[str, Any] | None
+
+    def spread(self, wrenches: Floats) -> str:
+        """Return the root mean square spread of the refits' twists [deg], in words.
+
+        Raises:
+            DataError: What is stored of the refits is no bootstrap.
+        """
+        if self.bootstrap is None:
+            return "-"
+        refits = surfaces_of(self.bootstrap, self.surface.scaling)
+        return f"{np.degrees(np.sqrt(np.mean(twist_spread(refits, wrenches) ** 2))):.2f}"
+
+
+def row_of(compared: Compared, test: Pairs) -> list[str]:
     """Return one row of the table."""
+    surface = compared.surface
     errors = errors_on(surface, test)
+    loads = quantiles(load_error(surface, test, scaling_of_pairs(test)))
     return [
-        name,
+        compared.name,
         surface.kind,
         str(size_of(surface)),
         *(f"{value:.3f}" for value in errors.velocity),
         f"{np.degrees(errors.mean_angle):.2f}",
-        "" if fit_time is None else f"{fit_time:.2f}",
+        *(f"{value:.3f}" for value in loads),
+        compared.spread(test.wrenches),
+        "-" if compared.fit_time is None else f"{compared.fit_time:.2f}",
         f"{microseconds_each(surface.twist_of_wrench, test.wrenches):.2f}",
         f"{microseconds_each(surface.wrench_of_twist, test.twists):.2f}",
     ]
@@ -148,11 +189,12 @@ def run(options: argparse.Namespace) -> None:
     data = read_input(options.data, options)
     test = data.held_out or data.training
     stems = [path.stem for path in stored]
-    surfaces: list[tuple[str, LimitSurface, float | None]] = [
-        (
+    surfaces = [
+        Compared(
             path.stem if stems.count(path.stem) == 1 else str(path),
             model.surface,
             model.fit.get("wall_time_s"),
+            model.fit.get("bootstrap"),
         )
         for path, model in stored.items()
     ]
@@ -161,7 +203,8 @@ def run(options: argparse.Namespace) -> None:
         for done, (word, chosen) in enumerate(wanted.items(), start=1):
             try:
                 result = fit(chosen, data, Search(options.starts, options.seed, executor))
-                surfaces.append((word, result.surface, result.wall_time))
+                refits = result.details.get("bootstrap")
+                surfaces.append(Compared(word, result.surface, result.wall_time, refits))
             except LimitSurfaceError as error:
                 refusals.append(f"{word}: {error}")
             progress(done, len(wanted))
@@ -169,7 +212,7 @@ def run(options: argparse.Namespace) -> None:
         raise DataError(f"nothing to compare is left: {'; '.join(refusals)}")
     kept = "held out" if data.held_out is not None else "fitted"
     print(f"{options.data}: {len(test)} pairs, {kept}")
-    print_table([row_of(*each[:2], test, each[2]) for each in surfaces])
+    print_table([row_of(each, test) for each in surfaces])
     for refusal in refusals:
         print(f"left out: {refusal}")
     if options.picture is not None:
@@ -186,7 +229,7 @@ def print_table(rows: list[list[str]]) -> None:
         print("  ".join(cells).rstrip())
 
 
-def draw(surfaces: list[tuple[str, LimitSurface, float | None]], test: Pairs, path: Path) -> None:
+def draw(surfaces: Sequence[Compared], test: Pairs, path: Path) -> None:
     """Draw the distributions of the errors of motion.
 
     Raises:
@@ -196,7 +239,7 @@ def draw(surfaces: list[tuple[str, LimitSurface, float | None]], test: Pairs, pa
     from limit_surface_ros.plots.canvas import new_figure, save_figure
     from limit_surface_ros.plots.distributions import draw_distributions
 
-    errors = {name: velocity_error(surface, test) for name, surface, _ in surfaces}
+    errors = {each.name: velocity_error(each.surface, test) for each in surfaces}
     with new_figure(7.0, 4.5) as figure:
         draw_distributions(figure.subplots(), errors, "error of motion |v - v^| of unit twists")
         save_figure(figure, path)

@@ -18,7 +18,12 @@ from limit_surface_ros.fitting.worker_processes import available_cores
 from limit_surface_ros.tools.given_options import model_name, refuse_unused
 from limit_surface_ros.tools.program import run_program
 from limit_surface_ros.tools.progress import progress_bar
-from limit_surface_ros.tools.surface_fit import add_fit_options, fit_model
+from limit_surface_ros.tools.surface_fit import (
+    WITHOUT_MOTIONS,
+    add_fit_options,
+    fit_model,
+    objective_of,
+)
 from limit_surface_ros.tools.training_data import ACCEPTED, is_bag
 
 if TYPE_CHECKING:
@@ -110,6 +115,9 @@ def refuse_options_of_others(options: argparse.Namespace) -> None:
             refuse_unused(top, options, ["family"], "for --kind power_sum")
         if options.kind == "polynomial":
             refuse_unused(top, options, ["terms"], "not for --kind polynomial")
+        objective = objective_of(options, recorded=suffix not in (".yaml", ".yml"))
+        if objective in WITHOUT_MOTIONS:
+            refuse_unused(top, options, ["velocity_weight"], f"not for the objective {objective}")
 
 
 def run(options: argparse.Namespace) -> None:

@@ -45,6 +45,8 @@ if TYPE_CHECKING:
 
 
 # What each kind can be fitted by, the default first.
+# Objectives that look at loads alone.
+WITHOUT_MOTIONS = ("J1", "forces", "least-squares")
 OBJECTIVES: dict[str, tuple[str, ...]] = {
     "power_sum": ("J2", "J1", "second"),
     "dissipation": FITTED_ON,
@@ -94,7 +96,7 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=1.0,
         metavar="W",
-        help="weight of the motions, in all but J1 and forces (%(default)s)",
+        help="weight of the motions, in all but J1, forces and least-squares (%(default)s)",
     )
     fit.add_argument(
         "--starts",
@@ -271,7 +273,7 @@ def fit_as_told(
     """Fit the kind and the objective that the options name."""
     if options.bootstrap:
         raise RangeError("--bootstrap refits what --auto has chosen: give both")
-    objective, weight = objective_of(options, data), float(options.velocity_weight)
+    objective, weight = objective_of(options, data.recorded), float(options.velocity_weight)
     pairs = data.training
     if options.kind == "polynomial":
         convex = objective == "convex"
@@ -300,15 +302,19 @@ def fit_as_told(
     )
 
 
-def objective_of(options: argparse.Namespace, data: TrainingData) -> str:
+def objective_of(options: argparse.Namespace, recorded: bool) -> str:
     """Return the objective, by default the first of the kind's.
+
+    Args:
+        options: What is asked for.
+        recorded: Whether the data are recorded pushes and not a contact.
 
     Raises:
         RangeError: The objective is none of the kind's.
     """
     accepted = OBJECTIVES[options.kind]
     if options.objective is None:
-        on_pushes = options.kind == "dissipation" and data.recorded
+        on_pushes = options.kind == "dissipation" and recorded
         return "directions" if on_pushes else accepted[0]
     if options.objective not in accepted:
         raise RangeError(

@@ -1,11 +1,15 @@
 """compare_surfaces: one table of models and kinds, pictures, and clear refusals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
+from limit_surface_ros.surface.point_contacts import PointContacts
 from limit_surface_ros.surface.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
+from limit_surface_ros.tools import fit_surface
 from limit_surface_ros.tools.compare_surfaces import main
 
 CONTACT = """schema: 1
@@ -49,6 +53,38 @@ def test_models_of_one_file_name_are_told_apart_by_their_folders(contact, tmp_pa
     few = ["--motions", "50", "--facet-loads", "0", "--workers", "1"]
     assert main([str(contact), "--models", *map(str, paths), *few]) == 0
     assert list(rows(capsys.readouterr().out)) == [str(path) for path in paths]
+
+
+def test_errors_of_loads_stand_beside_those_of_motions_in_one_unit(contact, tmp_path, capsys):
+    exact = PointContacts([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]], [0.5, 0.5, 0.5])
+    paths = [tmp_path / f"{name}.yaml" for name in ("exact", "small", "scaled")]
+    scaled = replace(exact, scaling=Scaling(0.3, 7.0))
+    for path, surface in zip(paths, (exact, exact.scaled(0.5), scaled), strict=True):
+        write_surface_model(SurfaceModel(path.stem, surface), path)
+    few = ["--motions", "200", "--facet-loads", "0", "--workers", "1"]
+    assert main([str(contact), "--models", *map(str, paths), *few]) == 0
+    table = rows(capsys.readouterr().out)
+    worst = {name: float(cells[9]) for name, cells in table.items()}
+    assert worst["exact"] == worst["scaled"] == 0.0
+    assert worst["small"] > 0.2
+
+
+def test_a_bootstrap_shows_its_spread(tmp_path, capsys):
+    rng = np.random.default_rng(0)
+    body = PointContacts([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]], [0.5, 0.5, 0.5])
+    twists = rng.normal(size=(30, 3)) * [1, 1, 15]
+    wrenches = body.wrench_of_twist(twists) * rng.normal(1.0, 0.1, size=(30, 3))
+    path, model = tmp_path / "pushes.csv", tmp_path / "box.yaml"
+    table = np.column_stack([wrenches, twists])
+    np.savetxt(path, table, delimiter=",", header="fx_N,fy_N,tau_Nm,vx,vy,omega", comments="")
+    few = ["--rows", "0-19", "--workers", "1"]
+    arguments = [str(path), "-o", str(model), "--auto", "--bootstrap", "5", *few]
+    assert fit_surface.main(arguments) == 0
+    capsys.readouterr()
+    assert main([str(path), "--models", str(model), "--fit", "thesis:1", *few]) == 0
+    table = rows(capsys.readouterr().out)
+    assert 0.1 < float(table["box"][10]) < 30.0
+    assert table["thesis:1"][10] == "-"
 
 
 def test_the_distributions_are_drawn(contact, tmp_path, capsys):

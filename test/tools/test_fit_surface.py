@@ -1,11 +1,15 @@
 """fit_surface: from data to a model file, or one clear line and no file."""
 
 import json
+import os
+import signal
+import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from catalogue_helpers import group_is_gone, started, until
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.fitting.bootstrap import surfaces_of
@@ -132,6 +136,11 @@ def test_the_automatic_fit_stores_its_choice_and_its_bootstrap(pushes, tmp_path)
         (["--folds", "3"], "it is for --auto"),
         (["--auto", "--terms", "4"], "--terms does nothing here: it is what --auto chooses"),
         (["--auto", "--kind", "dissipation"], "--kind does nothing here"),
+        (
+            ["--kind", "polynomial", "--velocity-weight", "2"],
+            "--velocity-weight does nothing here: it is not for the objective least-squares",
+        ),
+        (["--objective", "J1", "--velocity-weight", "2"], "not for the objective J1"),
         (["--characteristic-length", "0"], "must be"),
         (["--name", ""], "--name must not be empty"),
         (["--output", "model.txt"], "must end in .yaml or .yml"),
@@ -175,3 +184,38 @@ def test_real_pushes_are_predicted_within_twelve_degrees(tmp_path):
     assert main([str(pushes), "-o", str(output), "--rows", ",".join(map(str, rows))]) == 0
     held_out = read_pushes(pushes).rest(rows)
     assert np.degrees(mean_angle(read_surface_model(output).surface, held_out)) < 12.0
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_an_interrupted_fit_says_so_and_leaves_neither_file_nor_process(pushes, tmp_path, workers):
+    output = tmp_path / "model.yaml"
+    endless = ["--kind", "dissipation", "--terms", "6", "--starts", "100000"]
+    arguments = [pushes, "-o", output, *endless, "--workers", str(workers)]
+    process = started(
+        "limit_surface_ros.tools.fit_surface",
+        *arguments,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
+    # Well past the imports, in the fit: told by the processor time of the group's processes.
+    until(lambda: processor_ticks(process.pid) > 3 * os.sysconf("SC_CLK_TCK"), "the fit is going")
+    os.killpg(process.pid, signal.SIGINT)
+    errors = process.communicate(timeout=20)[1]
+    assert process.returncode == 130
+    assert len(errors.splitlines()) == 1
+    assert "interrupted" in errors
+    until(lambda: group_is_gone(process.pid), "every process of the run ends", 5)
+    assert [path.name for path in tmp_path.iterdir()] == ["pushes.csv"]
+
+
+def processor_ticks(group):
+    """Processor time of the processes of a group, in clock ticks."""
+    ticks = 0
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = stat.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(fields[2]) == group:
+            ticks += int(fields[11]) + int(fields[12])
+    return ticks
