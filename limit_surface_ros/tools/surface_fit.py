@@ -44,9 +44,9 @@ if TYPE_CHECKING:
     from limit_surface_ros.tools.training_data import TrainingData
 
 
-# What each kind can be fitted by, the default first.
 # Objectives that look at loads alone.
 WITHOUT_MOTIONS = ("J1", "forces", "least-squares")
+# What each kind can be fitted by, the default first.
 OBJECTIVES: dict[str, tuple[str, ...]] = {
     "power_sum": ("J2", "J1", "second"),
     "dissipation": FITTED_ON,
