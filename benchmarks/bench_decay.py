@@ -6,25 +6,15 @@ peer's where there is one.
 
 from __future__ import annotations
 
-import os
-
-# As in the programs: threads of BLAS only wait for each other. Before numpy is imported.
-for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
-    os.environ.setdefault(_variable, "1")
-
 import sys
 import warnings
 from collections.abc import Sequence
 from decimal import Decimal, localcontext
-from pathlib import Path
 
 import numpy as np
+from interleaved import interleaved
 from scipy.optimize import linprog
 from scipy.special import lambertw
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from interleaved import interleaved
 
 from limit_surface_ros.decay import examples
 from limit_surface_ros.decay.coefficient_fits import fit_coefficients

@@ -9,26 +9,17 @@ function of the samples on a circle, whose radius is the best of four.
 
 from __future__ import annotations
 
-import os
-
-for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
-    os.environ.setdefault(_variable, "1")
-
 import sys
 import time
 import warnings
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import scipy.interpolate
-from scipy import linalg
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
 from bench_decay import END, HORIZON, sampled_system, table
 from interleaved import interleaved
+from scipy import linalg
 
 from limit_surface_ros.decay import examples
 from limit_surface_ros.decay.delay_system import DelaySystem

@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from limit_surface_ros.surface import measures, sampling, shapes
 from limit_surface_ros.surface.contact_patch import ContactPatch

@@ -6,16 +6,7 @@ same cost, or its residuals, from the same starts; start by start, ours and the 
 
 from __future__ import annotations
 
-import os
-
-for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
-    os.environ.setdefault(_variable, "1")
-
 import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
 import time
 from collections.abc import Callable
 from statistics import median

@@ -7,15 +7,9 @@ wrote before. A plain C loop is the peer of `bench_maps_limits`.
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
-from scipy.optimize import root
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
 from interleaved import interleaved
+from scipy.optimize import root
 
 from limit_surface_ros.surface import shapes
 from limit_surface_ros.surface.contact_patch import ContactPatch

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 import time
 import tracemalloc
-from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
 from bench_maps import kinds
 from c_maps import compiled, map_in_c
 from interleaved import interleaved

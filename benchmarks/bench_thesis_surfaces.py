@@ -15,16 +15,7 @@ more starts of another seed; above 1.01, a deeper minimum was missed.
 
 from __future__ import annotations
 
-import os
-
-for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
-    os.environ.setdefault(_variable, "1")
-
 import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 

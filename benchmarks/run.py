@@ -3,9 +3,9 @@
 Usage: python benchmarks/run.py [NAME...]
 
 Each `bench_NAME.py` beside this file is a program of its own that prints Markdown (headings
-from ### down). Without names
-all are run; the sections of those that are not run stay as they were. The exit code is 1 when a
-benchmark failed; its section then keeps its last good result.
+from ### down); like this one it needs the package installed, which `make bench` sees to. Without
+names all are run; the sections of those that are not run stay as they were. The exit code is 1
+when a benchmark failed; its section then keeps its last good result.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ import sys
 import time
 from importlib import metadata
 from pathlib import Path
+
+from limit_surface_ros.blas_threads import use_one_by_default
 
 FOLDER = Path(__file__).resolve().parent
 RESULTS = FOLDER / "RESULTS.md"
@@ -80,6 +82,7 @@ def main(names: list[str]) -> int:
         print(f"no benchmark {unknown[0]!r}; there are {', '.join(programs)}", file=sys.stderr)
         return 2
     sections = kept_sections()
+    use_one_by_default()
     failed = []
     for name in names or programs:
         print(f"\n== {name}", flush=True)
