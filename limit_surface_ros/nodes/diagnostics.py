@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import PublisherEventCallbacks
 
 from limit_surface_ros.nodes.settings import Setting
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.nodes.health import Health
     from limit_surface_ros.nodes.parameters import Parameters
+    from limit_surface_ros.nodes.peers import Mismatch, Peers
 
 SETTINGS = (
     Setting(
@@ -46,6 +48,7 @@ class Diagnostics:
         node: The node.
         parameters: Its parameters, which include `SETTINGS`.
         health: What it has seen.
+        peers: Those on its topics.
         describe: Further values, by key.
     """
 
@@ -54,23 +57,43 @@ class Diagnostics:
         node: Node,
         parameters: Parameters,
         health: Health,
+        peers: Peers,
         describe: Callable[[], Mapping[str, str]],
     ) -> None:
         """Start the timer."""
         self._node = node
         self._health = health
+        self._peers = peers
+        self._strangers: list[Mismatch] = []
+        self._looks: dict[tuple[str, tuple[int, ...]], int] = {}
         self._describe = describe
         self._parameters = parameters
-        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._publisher = node.create_publisher(
+            DiagnosticArray,
+            "/diagnostics",
+            10,
+            event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
+        )
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         period = parameters["diagnostics_period"]
         self._timer = node.create_timer(period, self._publish, clock=steady)
 
     def _publish(self) -> None:
+        self._look_at_peers()
         message = DiagnosticArray(status=[self._status()])
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)
         self._health.restart_window()
+
+    def _look_at_peers(self) -> None:
+        before, self._looks = self._looks, {}
+        self._strangers = [*self._peers.mismatched()]
+        for peer in self._strangers:
+            key = peer.topic, peer.identity
+            self._looks[key] = looks = before.get(key, 0) + 1
+            # At the first look a peer that has just come may not have its name yet.
+            if looks == 2:
+                self._node.get_logger().warning(peer.sentence)
 
     def _status(self) -> DiagnosticStatus:
         health = self._health
@@ -81,10 +104,10 @@ class Diagnostics:
             level, summary = DiagnosticStatus.STALE, f"no input on {', '.join(stale)}"
         elif health.news:
             level, summary = DiagnosticStatus.WARN, f"{health.news} inputs refused"
-        elif health.qos_mismatches:
-            level = DiagnosticStatus.WARN
-            summary = f"incompatible QoS on {', '.join(health.qos_mismatches)}"
+        elif self._strangers:
+            level, summary = DiagnosticStatus.WARN, self._strangers[0].sentence
         values = {**self._describe(), **_numbers(health, now)}
+        values["mismatched peers"] = str(len(self._strangers))
         return DiagnosticStatus(
             level=level,
             name=self._node.get_fully_qualified_name().lstrip("/"),
@@ -104,6 +127,5 @@ def _numbers(health: Health, now: int) -> dict[str, str]:
         values[f"input age {name} [s]"] = "none yet" if seconds is None else f"{seconds:.3f}"
     values["callback time mean [ms]"] = f"{health.times.mean * 1e3:.3f}"
     values["callback time max [ms]"] = f"{health.times.longest * 1e3:.3f}"
-    values["QoS mismatches"] = str(sum(health.qos_mismatches.values()))
     values["last error"] = health.last_error
     return values

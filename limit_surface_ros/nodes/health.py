@@ -55,7 +55,6 @@ class Health:
         accepted: Requests and messages answered, by service or topic.
         refused: Requests and messages refused, by (service or topic, name of the error code).
         reported: Things worth a look that were accepted all the same, by what they are.
-        qos_mismatches: Peers with incompatible QoS, by topic.
         inputs: Age of each topic input.
         times: Time spent in callbacks since the last report.
         last_error: The last refusal's sentence.
@@ -65,7 +64,6 @@ class Health:
     accepted: Counter[str] = field(default_factory=Counter)
     refused: Counter[tuple[str, str]] = field(default_factory=Counter)
     reported: Counter[str] = field(default_factory=Counter)
-    qos_mismatches: Counter[str] = field(default_factory=Counter)
     inputs: dict[str, InputAge] = field(default_factory=dict)
     times: CallbackTimes = field(default_factory=CallbackTimes)
     last_error: str = ""

@@ -24,6 +24,7 @@ from limit_surface_ros.nodes import answers, diagnostics, spin
 from limit_surface_ros.nodes.health import Health, InputAge
 from limit_surface_ros.nodes.model_host import ModelHost
 from limit_surface_ros.nodes.parameters import Parameters
+from limit_surface_ros.nodes.peers import Peers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -80,7 +81,10 @@ class ModelNode(Node, Generic[Model]):
             raise
         self.health = Health()
         self.create_service(Trigger, "~/reload", self._reload)
-        self._diagnostics = diagnostics.Diagnostics(self, self.values, self.health, self.describe)
+        self._peers = Peers(self)
+        self._diagnostics = diagnostics.Diagnostics(
+            self, self.values, self.health, self._peers, self.describe
+        )
         self.get_logger().info(self.models.summary)
 
     def describe(self) -> dict[str, str]:
@@ -163,11 +167,10 @@ class ModelNode(Node, Generic[Model]):
             f"~/{name}",
             take,
             QoSProfile(depth=DEPTH, reliability=reliability),
-            event_callbacks=SubscriptionEventCallbacks(
-                incompatible_qos=functools.partial(self._mismatch, name)
-            ),
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
             qos_overriding_options=QoSOverridingOptions.with_default_policies(),
         )
+        self._peers.watch_input(f"~/{name}", subscription)
 
     def add_output(
         self, message_type: Any, name: str, *, latched: bool = False, depth: int = DEPTH
@@ -181,15 +184,15 @@ class ModelNode(Node, Generic[Model]):
             depth: Number of messages that are kept for slow subscribers; 1 if latched.
         """
         durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
-        return self.create_publisher(
+        publisher = self.create_publisher(
             message_type,
             f"~/{name}",
             QoSProfile(depth=1 if latched else depth, durability=durability),
-            event_callbacks=PublisherEventCallbacks(
-                incompatible_qos=functools.partial(self._mismatch, name)
-            ),
+            event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
             qos_overriding_options=QoSOverridingOptions.with_default_policies(),
         )
+        self._peers.watch_output(f"~/{name}", publisher)
+        return publisher
 
     def report(self, what: str, sentence: str) -> None:
         """Count something that is accepted but worth a look, and log it with a throttle."""
@@ -231,13 +234,6 @@ class ModelNode(Node, Generic[Model]):
             lines = "".join(traceback.format_exception(error))
             self.get_logger().error(f"{name}: {lines}", throttle_duration_sec=LOG_PERIOD)
         return sentence
-
-    def _mismatch(self, name: str, event: Any) -> None:
-        self.health.qos_mismatches[name] += event.total_count_change
-        self.get_logger().warning(
-            f"{name}: a peer's QoS is incompatible and gets or gives nothing; "
-            f"last policy {event.last_policy_kind}"
-        )
 
     def _reload(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         start = time.perf_counter()

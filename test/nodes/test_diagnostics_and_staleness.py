@@ -1,4 +1,4 @@
-"""Diagnostics tell what the node sees: counts, ages, stale inputs, QoS mismatches."""
+"""Diagnostics tell what the node sees: counts, ages, stale inputs, mismatched peers."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
 
+import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import TwistStamped, WrenchStamped
+from geometry_msgs.msg import TwistStamped, Vector3Stamped, WrenchStamped
 from limit_surface_interfaces.srv import WrenchToTwist
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
@@ -51,6 +52,17 @@ def watch(ros, client_node, model_file):
     return lambda **parameters: Watch(ros, client_node, path, **parameters)
 
 
+@pytest.fixture
+def stranger():
+    """Return a node of another process as far as DDS can tell: one has a single type a topic."""
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    node = rclpy.create_node("stranger", context=context)
+    yield node
+    node.destroy_node()
+    context.try_shutdown()
+
+
 def test_counts_ages_times_and_the_last_error_are_told(ros, client_node, watch):
     seen = watch()
     for wrench in ([9, 0, 0], [math.nan, 0, 0], [math.inf, 0, 0], [9, 0, 0]):
@@ -69,7 +81,7 @@ def test_counts_ages_times_and_the_last_error_are_told(ros, client_node, watch):
     assert values["model"] == "box"
     assert float(values["input age wrench [s]"]) >= 0.0
     assert values["input age twist [s]"] == "none yet"
-    assert values["QoS mismatches"] == "0"
+    assert values["mismatched peers"] == "0"
     assert "zero" in values["last error"]
     assert {"callback time mean [ms]", "callback time max [ms]"} <= set(values)
     assert seen.status.name == "limit_surface"
@@ -140,12 +152,47 @@ def test_staleness_counts_in_simulated_time_also_when_it_jumps_back(ros, client_
     assert fresh_status() == DiagnosticStatus.STALE
 
 
-def test_a_peer_with_incompatible_qos_is_counted(ros, client_node, watch):
+@pytest.mark.parametrize(
+    ("kind", "topic", "word"),
+    [
+        (TwistStamped, "predicted_twist", "ransient local subscription"),
+        (Vector3Stamped, "predicted_twist", "Vector3Stamped"),
+        (DiagnosticArray, "surface", "DiagnosticArray"),
+    ],
+)
+def test_a_subscriber_that_gets_nothing_is_told_of_until_it_goes(
+    stranger, watch, kind, topic, word
+):
     seen = watch()
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    client_node.create_subscription(
-        TwistStamped, "/limit_surface/predicted_twist", lambda _: None, latched
-    )
-    seen.wait(lambda: seen.values.get("QoS mismatches") == "1")
+    deaf = stranger.create_subscription(kind, f"/limit_surface/{topic}", lambda _: None, latched)
+    told = f"/stranger gets or gives nothing on ~/{topic}"
+    seen.wait(lambda: seen.status.message.startswith(told))
     assert seen.status.level == DiagnosticStatus.WARN
-    assert "QoS" in seen.status.message
+    assert seen.values["mismatched peers"] == "1"
+    assert word in seen.status.message
+    stranger.destroy_subscription(deaf)
+    seen.wait(lambda: seen.values.get("mismatched peers") == "0")
+    assert seen.status.level == DiagnosticStatus.OK
+
+
+def test_a_publisher_that_is_not_heard_is_told_of(stranger, watch):
+    seen = watch()
+    stranger.create_publisher(Vector3Stamped, "/limit_surface/twist", 1)
+    seen.wait(lambda: seen.values.get("mismatched peers") == "1")
+    assert "Vector3Stamped" in seen.status.message
+
+
+def test_topics_renamed_onto_each_other_are_still_told_apart(
+    ros, client_node, stranger, model_file
+):
+    _, path = model_file()
+    swap = ["~/wrench:=/limit_surface/twist", "~/twist:=/limit_surface/wrench"]
+    ros.add(LimitSurfaceNode, files=[path], parameters={"diagnostics_period": 0.05}, remap=swap)
+    arrays = ros.listen(client_node, DiagnosticArray, "/diagnostics")
+    stranger.create_publisher(WrenchStamped, "/limit_surface/twist", 1)
+    stranger.create_publisher(WrenchStamped, "/limit_surface/wrench", 1)
+    ros.wait(lambda: arrays and "TwistStamped" in arrays[-1].status[0].message)
+    message = arrays[-1].status[0].message
+    assert "~/twist" in message
+    assert "its type is geometry_msgs/msg/WrenchStamped" in message
