@@ -8,8 +8,10 @@ exp(a t) sin(b t). This module imports numpy only, so that a node may load it at
 from __future__ import annotations
 
 import math
+from cmath import exp
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -282,42 +284,91 @@ class ExponentialSum:
                 f"{self.slowest_rate:g}, which must be below 0"
             )
 
+    def _at_one(self, time: float) -> float:
+        """Return x at one time, by plain numbers: numpy's overhead is most of the cost there."""
+        return sum((c * exp(rate * time)).real for rate, c in self._pairs)
+
+    @cached_property
+    def _pairs(self) -> list[tuple[complex, complex]]:
+        return list(zip(self.rates.tolist(), self.coefficients.tolist(), strict=True))
+
+    @cached_property
+    def _envelope(self) -> list[tuple[float, float]]:
+        """Times, each twice the one before, and sum |c| exp(Re lambda t), as far as asked for."""
+        return []
+
     def _time_of_envelope(self, level: float) -> float:
         """Return a time from which on sum |c| exp(Re lambda t), and so |x|, is below a level."""
+        for end, height in self._envelope:
+            if height <= level:
+                return end
         sizes = np.abs(self.coefficients)
-        end = 1.0 / float(np.abs(self.rates.real).max())
-        while float(sizes @ np.exp(self.rates.real * end)) > level:
-            end *= 2.0
-        return end
+        while True:
+            if self._envelope:
+                end = 2.0 * self._envelope[-1][0]
+            else:
+                end = 1.0 / float(np.abs(self.rates.real).max())
+            height = float(sizes @ np.exp(self.rates.real * end))
+            self._envelope.append((end, height))
+            if height <= level:
+                return end
 
-    def _last_excess(
-        self, start: float, end: float, level: float, resolution: float
-    ) -> float | None:
-        """Return the last time in [start, end] at which |x| exceeds a level, if there is one."""
+    @cached_property
+    def _whole(self) -> dict[float, _Cells]:
+        """The cells of [0, end] by the ends that levels led to: these are few."""
+        return {}
+
+    def _cells(self, start: float, end: float) -> _Cells:
         times = np.linspace(start, end, SEARCH_CELLS + 1)
         width = (end - start) / SEARCH_CELLS
         values = np.abs(self._at(times))
         growth = np.abs(self.coefficients) * np.abs(self.rates) ** 2
         curvature = np.exp(np.multiply.outer(times[:-1], self.rates.real)) @ growth
         highest = np.maximum(values[:-1], values[1:]) + curvature * (width * width / 8.0)
-        for cell in np.flatnonzero(highest > level)[::-1]:
-            left, right = float(times[cell]), float(times[cell + 1])
+        return _Cells(times, values, curvature, highest)
+
+    def _last_excess(
+        self, start: float, end: float, level: float, resolution: float
+    ) -> float | None:
+        """Return the last time in [start, end] at which |x| exceeds a level, if there is one."""
+        if start > 0.0:
+            cells = self._cells(start, end)
+        else:
+            if end not in self._whole:
+                self._whole[end] = self._cells(start, end)
+            cells = self._whole[end]
+        width = (end - start) / SEARCH_CELLS
+        for cell in np.flatnonzero(cells.highest > level)[::-1].tolist():
+            left, right = cells.times[cell : cell + 2].tolist()
             if width <= resolution or not left < 0.5 * (left + right) < right:
-                return right if values[cell] > level else left
-            if values[cell] > level >= values[cell + 1]:
-                slope = float((self.rates * np.exp(left * self.rates) @ self.coefficients).real)
+                return float(right if cells.values[cell] > level else left)
+            if cells.values[cell] > level >= cells.values[cell + 1]:
+                slope = sum((c * rate * exp(rate * left)).real for rate, c in self._pairs)
                 # Steeper than the curvature can undo, x falls through the level once.
-                if abs(slope) > curvature[cell] * width:
+                if abs(slope) > cells.curvature[cell] * width:
                     return root_bracket(
-                        lambda t: level - abs(float(self._at(np.array([t]))[0])),
-                        left,
-                        right,
-                        resolution,
+                        lambda t: level - abs(self._at_one(t)), left, right, resolution
                     )[1]
             found = self._last_excess(left, right, level, resolution)
             if found is not None:
                 return found
         return None
+
+
+class _Cells(NamedTuple):
+    """What is known of |x| in the cells of an interval.
+
+    Attributes:
+        times: Their ends, shape (n + 1,).
+        values: |x| there.
+        curvature: Bound of |x''| within each, shape (n,).
+        highest: Bound of |x| within each, shape (n,).
+    """
+
+    times: Floats
+    values: Floats
+    curvature: Floats
+    highest: Floats
 
 
 def _used_columns(rates: Complexes) -> Bools:

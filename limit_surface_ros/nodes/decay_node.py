@@ -17,7 +17,7 @@ from limit_surface_ros.files.decay_file import DecayModel, read_decay_model
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.nodes import convert, frames, planar_inputs, spin
 from limit_surface_ros.nodes.model_host import model_settings
-from limit_surface_ros.nodes.model_info import decay_info
+from limit_surface_ros.nodes.model_info import Listing, decay_info
 from limit_surface_ros.nodes.model_node import ModelNode
 from limit_surface_ros.nodes.onset import Onset
 from limit_surface_ros.nodes.onset_stream import OnsetStream
@@ -100,6 +100,7 @@ class DecayNode(ModelNode[DecayModel]):
     def __init__(self, **options: Any) -> None:
         """Read the models and start serving."""
         super().__init__(NAME, SETTINGS, read_decay_model, **options)
+        self._listing = Listing(decay_info)
         self._surfaces = self.add_models(
             read_surface_model, "surface_files", "default_surface", "surface"
         )
@@ -225,9 +226,7 @@ class DecayNode(ModelNode[DecayModel]):
         return self._start_stream
 
     def _list_models(self, _: ListDecays.Request, response: ListDecays.Response) -> None:
-        default = self.models.models.default
-        infos = [decay_info(model, model.name == default) for model in self.models.models]
-        response.models = sorted(infos, key=lambda info: not info.is_default)
+        response.models = self._listing.of(self.models.models)
 
     def _evaluate(self, request: EvaluateDecay.Request, response: EvaluateDecay.Response) -> None:
         model = self.models[request.model]

@@ -3,21 +3,47 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import yaml
 from limit_surface_interfaces.msg import DecayInfo, ModelInfo
 
+from limit_surface_ros.files.model_set import Model
 from limit_surface_ros.files.yaml_reader import plain
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from limit_surface_ros.files.decay_file import DecayModel
+    from limit_surface_ros.files.model_set import ModelSet
     from limit_surface_ros.files.surface_file import SurfaceModel
+
+Info = TypeVar("Info", ModelInfo, DecayInfo)
 
 # What counts the terms of a kind, by the attribute that holds them.
 _TERMS = ("matrices", "points", "coefficients")
+
+
+class Listing(Generic[Model, Info]):
+    """The list of the models that are served, made anew when others are.
+
+    Args:
+        describe: Makes the message for a model, told whether it is the default.
+    """
+
+    def __init__(self, describe: Callable[[Model, bool], Info]) -> None:
+        """List nothing yet."""
+        self._describe = describe
+        self._models: ModelSet[Model] | None = None
+        self._infos: list[Info] = []
+
+    def of(self, models: ModelSet[Model]) -> list[Info]:
+        """Return the messages of the models, the default's first."""
+        if models is not self._models:
+            infos = [self._describe(model, model.name == models.default) for model in models]
+            self._infos = sorted(infos, key=lambda info: not info.is_default)
+            self._models = models
+        return self._infos
 
 
 def model_info(model: SurfaceModel, is_default: bool) -> ModelInfo:

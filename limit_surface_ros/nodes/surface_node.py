@@ -17,7 +17,7 @@ from limit_surface_interfaces.srv import (
 from limit_surface_ros.files.surface_file import SurfaceModel, read_surface_model
 from limit_surface_ros.nodes import convert, frames, planar_inputs, surface_markers
 from limit_surface_ros.nodes.model_host import model_settings
-from limit_surface_ros.nodes.model_info import model_info
+from limit_surface_ros.nodes.model_info import Listing, model_info
 from limit_surface_ros.nodes.model_node import ModelNode
 from limit_surface_ros.nodes.planar_inputs import PlanarInputs
 from limit_surface_ros.nodes.settings import Setting
@@ -60,6 +60,7 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
     def __init__(self, **options: Any) -> None:
         """Read the models and start serving."""
         super().__init__(NAME, SETTINGS, read_surface_model, **options)
+        self._listing = Listing(model_info)
         self._inputs = PlanarInputs(self.values, frames.Frames(self, self.values), self.report)
         self._markers = SurfaceMarkers(self, self._present)
         self._twists = self.add_output(TwistStamped, "predicted_twist")
@@ -130,9 +131,7 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
             _head(stamped.header, request.contact.header, model)
 
     def _list_models(self, _: ListModels.Request, response: ListModels.Response) -> None:
-        default = self.models.models.default
-        infos = [model_info(model, model.name == default) for model in self.models.models]
-        response.models = sorted(infos, key=lambda info: not info.is_default)
+        response.models = self._listing.of(self.models.models)
 
     def _predict(self, message: WrenchStamped) -> None:
         model = self.models[""]

@@ -11,14 +11,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from math import atan, atan2, cos, sin
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cache
+from math import atan, atan2, cos, hypot, sin
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
 from limit_surface_ros.checks import as_floats
 from limit_surface_ros.errors import RangeError, ShapeError, ZeroVectorError
 from limit_surface_ros.root_bracket import root_bracket
+from limit_surface_ros.surface.dissipation_surface import DissipationSurface
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -26,10 +28,16 @@ if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.surface.protocol import LimitSurface
 
-# Width [rad] of a bracket of force directions that is as good as one direction.
+# Width of a bracket of directions [rad], or part of the range of turning rates, that is as good as
+# one of them.
 _WIDTH = 1e-13
-# Error of direction [rad] of the velocity at the contact that counts as none.
-_EXACT = 1e-14
+# Error of the velocity's direction at the contact [rad], or of the moment about it in parts of the
+# moment scale, that counts as none.
+_EXACT = 1e-12
+# Sine between two velocities below which they count as one direction.
+_PARALLEL = 1e-12
+# A body that turns freely about its contact needs no turning rate, however large.
+_DOUBLINGS = 60
 
 
 class ContactMode(str, Enum):
@@ -89,7 +97,7 @@ def motion_cone(
         RangeError: The coefficient is negative or not finite.
     """
     contact = _Contact(surface, point, normal, friction)
-    edges = contact.edges()
+    edges = contact.edge(-1.0), contact.edge(1.0)
     return MotionCone(
         np.array([contact.wrench(edge.angle, edge.twist) for edge in edges]),
         np.array([edge.twist for edge in edges]),
@@ -120,19 +128,18 @@ def push(
         RangeError: The coefficient is negative or not finite.
     """
     contact = _Contact(surface, point, normal, friction)
-    pushed = _pair("velocity", velocity)
-    approach = float(pushed @ contact.normal)
+    pushed = _numbers("velocity", velocity)
+    approach = _product(pushed, contact.normal)
     if approach <= 0.0:
         return Push(np.zeros(3), ContactMode.SEPARATE, np.zeros(3))
-    right, left = contact.edges()
-    heading = contact.angle_of(pushed)
-    if right.heading <= heading <= left.heading:
-        return contact.stick(pushed, (right, left), heading)
-    if heading > left.heading:
-        edge, mode = left, ContactMode.SLIDE_LEFT
+    if isinstance(surface, DissipationSurface):
+        found = contact.stick_by_turning(surface, pushed)
     else:
-        edge, mode = right, ContactMode.SLIDE_RIGHT
-    speed = approach / float(edge.velocity @ contact.normal)
+        found = contact.stick_by_force(pushed)
+    if isinstance(found, Push):
+        return found
+    edge, mode = found
+    speed = approach / _product(edge.velocity, contact.normal)
     return Push(speed * edge.twist, mode, contact.wrench(edge.angle, edge.twist))
 
 
@@ -141,8 +148,12 @@ class _Response(NamedTuple):
 
     angle: float
     twist: Floats
-    velocity: Floats
+    velocity: tuple[float, float]
     heading: float
+
+
+# A sticking push, or the edge of the friction cone along which the pusher slides, and how.
+_Outcome: TypeAlias = "Push | tuple[_Response, ContactMode]"
 
 
 class _Contact:
@@ -152,46 +163,83 @@ class _Contact:
         self, surface: LimitSurface, point: ArrayLike, normal: ArrayLike, friction: float
     ) -> None:
         self._surface = surface
-        self._x, self._y = _pair("point", point).tolist()
-        direction = _pair("normal", normal)
-        if not direction.any():
+        self._x, self._y = _numbers("point", point)
+        nx, ny = _numbers("normal", normal)
+        if not (nx or ny):
             raise ZeroVectorError("normal must not be zero: it has no direction")
         if not 0.0 <= friction < float("inf"):
             raise RangeError(f"friction must be a finite number from 0 on, got {friction}")
-        self.normal = direction / np.hypot(*direction)
-        self._normal = self.normal.tolist()
+        length = hypot(nx, ny)
+        self.normal = nx / length, ny / length
         self._half_angle = atan(friction)
 
-    def edges(self) -> tuple[_Response, _Response]:
-        """Return what the forces along the right and the left edge of the friction cone cause."""
-        return self._respond(-self._half_angle), self._respond(self._half_angle)
+    def edge(self, side: float) -> _Response:
+        """Return what the force along the left (1) or right (-1) edge of the cone causes."""
+        return self._respond(side * self._half_angle)
 
-    def angle_of(self, vector: Floats) -> float:
-        """Return the angle [rad] of a planar vector, counter-clockwise from the normal."""
-        nx, ny = self._normal
-        vx, vy = vector.tolist()
-        return atan2(nx * vy - ny * vx, nx * vx + ny * vy)
-
-    def stick(self, velocity: Floats, edges: tuple[_Response, _Response], heading: float) -> Push:
+    def stick_by_force(self, velocity: tuple[float, float]) -> _Outcome:
         """Find the force within the cone for which the body follows the pusher.
 
         The velocity that a force causes at the contact turns with the force, so that a bracket
         of directions shrinks to the answer. Where the load is at a corner of the surface its
         twists fill a cone: the answer is the sum of its edges that has the pusher's velocity.
         """
-        right, left = edges
+        respond = cache(self._respond)
+        right, left = respond(-self._half_angle), respond(self._half_angle)
+        heading = self._angle_of(velocity)
+        if heading > left.heading:
+            return left, ContactMode.SLIDE_LEFT
+        if heading < right.heading:
+            return right, ContactMode.SLIDE_RIGHT
         ends = root_bracket(
-            lambda angle: self._respond(angle).heading - heading,
+            lambda angle: respond(angle).heading - heading,
             right.angle,
             left.angle,
             _WIDTH,
             _EXACT,
         )
-        low, high = map(self._respond, ends)
-        velocities = np.array([low.velocity, high.velocity])
-        shares = np.linalg.lstsq(velocities.T, velocity, rcond=1e-9)[0]
-        twist = shares @ np.array([low.twist, high.twist])
+        low, high = map(respond, ends)
+        twist = _sum_with_velocity(low, high, velocity)
         return Push(twist, ContactMode.STICK, self.wrench(0.5 * (low.angle + high.angle), twist))
+
+    def stick_by_turning(
+        self, surface: DissipationSurface, velocity: tuple[float, float]
+    ) -> _Outcome:
+        """Find the motion of least dissipation in which the body follows the pusher.
+
+        The moment about the contact of the load that a turning rate needs rises with the rate,
+        and is zero in a push. Where support points stand still it jumps: the answer is then the
+        sum of the loads on both sides that has no moment. These loads come in closed form.
+        """
+        vx, vy = velocity
+
+        def motion(rate: float) -> tuple[float, float, float]:
+            return vx + rate * self._y, vy - rate * self._x, rate
+
+        @cache
+        def load(rate: float) -> Floats:
+            return surface.wrench_of_twist(motion(rate))
+
+        def moment(rate: float) -> float:
+            fx, fy, torque = load(rate).tolist()
+            return float(torque - self._x * fy + self._y * fx)
+
+        reach = hypot(vx, vy) / surface.scaling.characteristic_length
+        for _ in range(_DOUBLINGS):
+            if moment(-reach) <= 0.0 <= moment(reach):
+                break
+            reach *= 2.0
+        exact = _EXACT * float(surface.scaling.wrench_unit[2])
+        low, high = root_bracket(moment, -reach, reach, _WIDTH * reach, exact)
+        below, above = moment(low), moment(high)
+        share = below / (below - above) if below < 0.0 < above else 0.5
+        wrench = (1.0 - share) * load(low) + share * load(high)
+        angle = self._angle_of((wrench[0], wrench[1]))
+        if angle > self._half_angle:
+            return self.edge(1.0), ContactMode.SLIDE_LEFT
+        if angle < -self._half_angle:
+            return self.edge(-1.0), ContactMode.SLIDE_RIGHT
+        return Push(np.array(motion(0.5 * (low + high))), ContactMode.STICK, wrench)
 
     def wrench(self, angle: float, twist: Floats) -> Floats:
         """Return the wrench on the surface (3,) of a force at an angle that causes a twist."""
@@ -204,19 +252,45 @@ class _Contact:
     def _respond(self, angle: float) -> _Response:
         twist = self._surface.twist_of_wrench(self._load(angle))
         vx, vy, omega = twist.tolist()
-        velocity = np.array([vx - omega * self._y, vy + omega * self._x])
-        return _Response(angle, twist, velocity, self.angle_of(velocity))
+        velocity = vx - omega * self._y, vy + omega * self._x
+        return _Response(angle, twist, velocity, self._angle_of(velocity))
 
     def _load(self, angle: float) -> tuple[float, float, float]:
         """Return the wrench of a unit force through the contact."""
-        nx, ny = self._normal
+        nx, ny = self.normal
         fx = nx * cos(angle) - ny * sin(angle)
         fy = ny * cos(angle) + nx * sin(angle)
         return fx, fy, self._x * fy - self._y * fx
 
+    def _angle_of(self, vector: tuple[float, float]) -> float:
+        """Return the angle [rad] of a planar vector, counter-clockwise from the normal."""
+        return atan2(_turn(self.normal, vector), _product(self.normal, vector))
 
-def _pair(name: str, values: ArrayLike) -> Floats:
+
+def _sum_with_velocity(low: _Response, high: _Response, velocity: tuple[float, float]) -> Floats:
+    """Return the sum of two neighbouring motions, with factors, that has a velocity."""
+    turn = _turn(low.velocity, high.velocity)
+    if abs(turn) > _PARALLEL * hypot(*low.velocity) * hypot(*high.velocity):
+        first = _turn(velocity, high.velocity) / turn
+        second = _turn(low.velocity, velocity) / turn
+    else:
+        square = _product(velocity, velocity)
+        first = 0.5 * square / _product(velocity, low.velocity)
+        second = 0.5 * square / _product(velocity, high.velocity)
+    return first * low.twist + second * high.twist
+
+
+def _turn(a: tuple[float, float], b: tuple[float, float]) -> float:
+    return a[0] * b[1] - a[1] * b[0]
+
+
+def _product(a: tuple[float, float], b: tuple[float, float]) -> float:
+    return a[0] * b[0] + a[1] * b[1]
+
+
+def _numbers(name: str, values: ArrayLike) -> tuple[float, float]:
     pair = as_floats(name, values)
     if pair.shape != (2,):
         raise ShapeError(f"{name} must have shape (2,), got {pair.shape}")
-    return pair
+    x, y = pair.tolist()
+    return x, y
