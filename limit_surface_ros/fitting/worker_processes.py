@@ -50,9 +50,21 @@ def worker_processes(workers: int) -> Iterator[Executor]:
     except BaseException:
         for process in set(multiprocessing.active_children()) - others:
             process.terminate()
+        _let_go(pool)
         raise
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def _let_go(pool: ProcessPoolExecutor) -> None:
+    """Free the thread that hands out tasks, if it waits for workers that are gone to take one.
+
+    A task larger than a pipe would hold it, and with it the program's end, for ever: Python before
+    3.11.5 (gh-94777) leaves the pipe's other end open.
+    """
+    reader = getattr(getattr(pool, "_call_queue", None), "_reader", None)
+    if reader is not None:
+        reader.close()
 
 
 def _begin() -> None:

@@ -1,0 +1,43 @@
+"""An interrupt ends a pool of processes at once, whatever its tasks are and whatever they hold."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+PROGRAM = """
+import sys, time
+from limit_surface_ros.fitting.worker_processes import worker_processes
+
+def work(data):
+    time.sleep(60)
+
+if __name__ == "__main__":
+    with worker_processes(2) as pool:
+        waiting = [pool.submit(work, bytes(int(sys.argv[1]))) for _ in range(8)]
+        print("at work", flush=True)
+        waiting[0].result()
+"""
+
+
+# The larger tasks fill the pipe to the workers, so that a thread waits to hand them out.
+@pytest.mark.parametrize("size", [10, 1_000_000])
+def test_an_interrupt_ends_the_pool_also_while_tasks_wait_to_be_handed_out(tmp_path, size):
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM, encoding="utf-8")
+    process = subprocess.Popen(
+        [sys.executable, str(program), str(size)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    assert process.stdout.readline() == "at work\n"
+    os.killpg(process.pid, signal.SIGINT)
+    try:
+        errors = process.communicate(timeout=20)[1]
+    finally:
+        process.kill()
+    assert errors.rstrip().endswith("KeyboardInterrupt")
