@@ -52,6 +52,10 @@ class BoundedGauge(Gauge, Protocol):
         """Return P (m, 3, 3): the ellipsoids x' P^-1 x = 1 touch the surface at points (3, m)."""
         ...
 
+    def along_ellipsoids(self, points: Floats, normals: Floats) -> Floats:
+        """Return P n (3, m) for normals n (3, m), with P as `ellipsoids` gives it."""
+        ...
+
 
 class ConvexInverse:
     """Points x of g(x) = 1 with the largest n.x, for a convex gauge g."""
@@ -202,8 +206,8 @@ class PeakInverse:
         points = np.einsum("mij,jm->im", ellipsoids, units)
         if isinstance(self._gauge, BoundedGauge):
             for _ in range(_BOUND_STEPS):
-                ellipsoids = self._gauge.ellipsoids(points / np.abs(points).max(axis=0))
-                points = np.einsum("mij,jm->im", ellipsoids, units)
+                points /= np.abs(points).max(axis=0)
+                points = self._gauge.along_ellipsoids(points, units)
         points, _, _ = plane_minimum(self._gauge, units, points, np.zeros(units.shape[1]))
         return points / self._gauge.values(points)
 

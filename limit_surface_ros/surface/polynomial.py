@@ -131,7 +131,8 @@ class Polynomial(ScaledSurface):
         if curvatures[:, 0].min() > -1e-9 * curvatures[:, -1].max():
             climb = ConvexInverse(round_surface, directions)
             return FramedInverse(frame, TabulatedInverse(round_surface, climb))
-        return FramedInverse(frame, PeakInverse(round_surface, directions[:, _STARTS:]))
+        peaks = PeakInverse(round_surface, directions[:, _STARTS:])
+        return FramedInverse(frame, TabulatedInverse(round_surface, peaks, convex=False))
 
     def _gradient(self, loads: Floats) -> tuple[Floats, Floats]:
         """Return the gradient (3, ...) and the Hessian (3, 3, ...) at scaled loads (3, ...)."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from limit_surface_ros.surface.corners import Corners
 from limit_surface_ros.surface.power_sum_scale import log_scales, scale_and_shares
+from limit_surface_ros.surface.quadratic_form import solve_symmetric
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
@@ -78,11 +79,20 @@ class PowerGauge:
     def ellipsoids(self, loads: Floats) -> Floats:
         """Return P (m, 3, 3): ellipsoids f' P^-1 f = 1 within the surface, touching it.
 
-        Each q^p is concave in q, so that its tangent in q, a quadratic form of the load, lies
-        above it: on the surface, sum_i p_i h_i (q_i / q_i0 - 1) <= 0 bounds a set within it.
-
         Args:
             loads: Directions in which they touch, shape (3, m).
+        """
+        return np.asarray(np.linalg.inv(np.moveaxis(self._tangent_forms(loads), 2, 0)))
+
+    def along_ellipsoids(self, loads: Floats, normals: Floats) -> Floats:
+        """Return P n (3, m), along the load of most power n.f on each of `ellipsoids`."""
+        return solve_symmetric(self._tangent_forms(loads), normals)
+
+    def _tangent_forms(self, loads: Floats) -> Floats:
+        """Return P^-1 (3, 3, m), quadratic forms that are 1 on ellipsoids within the surface.
+
+        Each q^p is concave in q, so that its tangent in q, a quadratic form of the load, lies
+        above it: on the surface, sum_i p_i h_i (q_i / q_i0 - 1) <= 0 bounds a set within it.
         """
         images = self._roots @ loads
         values = np.einsum("kcm,kcm->km", images, images)
@@ -91,11 +101,11 @@ class PowerGauge:
         log_scale = log_scales(values, self._exponents)
         shares = p * np.exp(p * (np.log(values) + 2.0 * log_scale))
         weights = shares / (values * np.exp(2.0 * log_scale) * shares.sum(axis=0))
-        forms = np.einsum("km,kij->mij", weights, self._forms)
+        forms = (self._forms.reshape(-1, 9).T @ weights).reshape(3, 3, -1)
         # Beside a ridge one term outweighs all others: keep the form regular.
-        diagonal = np.einsum("mii->mi", forms)
-        diagonal += 1e-13 * diagonal.sum(axis=1, keepdims=True)
-        return np.asarray(np.linalg.inv(forms))
+        diagonal = np.einsum("iim->im", forms)
+        diagonal += 1e-13 * diagonal.sum(axis=0)
+        return forms
 
     def corners(self) -> Corners | None:
         """Return the loads that one norm, a term of exponent 1/2 and rank two, does not see."""

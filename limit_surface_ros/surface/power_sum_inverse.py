@@ -72,7 +72,8 @@ def _inverse_of_round(roots: Floats, exponents: Floats) -> Inverse:
     if (exponents >= 0.5).all():
         climb = ConvexInverse(gauge, even_directions(_CONVEX_STARTS).T, gauge.corners())
         return TabulatedInverse(gauge, climb)
-    summits = PeakInverse(gauge, _starts(roots, exponents))
+    peaks = PeakInverse(gauge, _starts(roots, exponents))
+    summits = TabulatedInverse(gauge, peaks, convex=False)
     ranks = np.abs(roots).any(axis=2).sum(axis=1)
     low = exponents <= 0.5
     spikes = [np.cross(root[0], root[1]) for root in roots[low & (ranks == 2)]]

@@ -6,6 +6,9 @@ is almost right. The surface's own gradient there tells the normal for which it 
 and from that normal to the wanted one it is so short a way that the table's curvature leads along
 it. A second gradient proves the answer. Where it does not, as across a kink, the inverse that made
 the table solves.
+
+A surface that bends inward may have several points with the wanted normal, and a gradient does not
+tell the best. There a cell of the table is read only if one sheet of the surface serves all of it.
 """
 
 from __future__ import annotations
@@ -31,6 +34,11 @@ _WORTH = (2 * _CELLS + 1) ** 2
 _STEPS = 6
 # Distance in the chart within which a last step proves the point; its own error is a part of that.
 _LAST_STEP = 1e-10
+# Part of a surface's size by which points of one sheet differ at most, found in two ways.
+_SAME = 1e-9
+# Error of a cell's polynomial, in parts of D, above which two sheets may meet in the cell: their
+# slopes differ there, and a slope within a cell is about a hundredth of that on the chart.
+_SMOOTH = 1e-6
 
 
 class FirstOrder(Protocol):
@@ -42,12 +50,19 @@ class FirstOrder(Protocol):
 
 
 class TabulatedInverse:
-    """The inverse of a convex gauge, with a table from the moment that it pays."""
+    """The inverse of a gauge, with a table from the moment that it pays."""
 
-    def __init__(self, gauge: FirstOrder, inverse: Inverse) -> None:
-        """Keep the gauge and its inverse, which makes the table and solves what is hard."""
+    def __init__(self, gauge: FirstOrder, inverse: Inverse, *, convex: bool = True) -> None:
+        """Keep the gauge and its inverse, which makes the table and solves what is hard.
+
+        Args:
+            gauge: The gauge.
+            inverse: Its inverse.
+            convex: Whether a point with the wanted normal is the answer for that alone.
+        """
         self._gauge = gauge
         self._inverse = inverse
+        self._convex = convex
         self._asked = 0
         self._table: SupportTable | None = None
 
@@ -61,7 +76,7 @@ class TabulatedInverse:
             self._asked += normals.shape[1]
             if self._asked <= _WORTH:
                 return self._inverse.solve(normals)
-            self._table = SupportTable(self._gauge, self._inverse)
+            self._table = SupportTable(self._gauge, self._inverse, convex=self._convex)
         points, certain = self._table.points(normals)
         hard = np.flatnonzero(~certain)
         if len(hard):
@@ -74,7 +89,7 @@ class TabulatedInverse:
 
 
 class SupportTable:
-    """The support function D of a convex surface g(x) = 1, on a stereographic chart.
+    """The support function D of a surface g(x) = 1, on a stereographic chart.
 
     A normal n with n_z >= 0 is (|n| + n_z) w, where w = (a, b, (1 - a^2 - b^2) / 2) and
     (a, b) = (n_x, n_y) / (|n| + n_z) lies in the unit disc. With h(a, b) = D(w) the point is
@@ -84,8 +99,13 @@ class SupportTable:
     The surface is its own mirror image: -n has the point -x.
     """
 
-    def __init__(self, gauge: FirstOrder, inverse: Inverse) -> None:
+    def __init__(self, gauge: FirstOrder, inverse: Inverse, *, convex: bool = True) -> None:
         """Fit the polynomials to points that the inverse finds, and try them between these.
+
+        Args:
+            gauge: The gauge g.
+            inverse: Its inverse.
+            convex: Whether a point with the wanted normal is the answer for that alone.
 
         Raises:
             SolverError: A point could not be certified.
@@ -96,14 +116,21 @@ class SupportTable:
         points, height = inverse.solve(normals)
         slopes = points[:2] - points[2] * places
         samples = np.array([height, *slopes / _CELLS]).reshape(3, 2 * _CELLS + 1, -1)
+        coefficients, misfit = _quintics(samples)
         # Rounding to single precision is mended by the steps that follow.
         with np.errstate(over="ignore", under="ignore"):
-            self._coefficients = _quintics(samples).astype(np.float32)
+            self._coefficients = coefficients.astype(np.float32)
         # A cell that proves nothing, as within a corner's cone, is not worth reading.
         self._useful = np.ones(_CELLS**2, dtype=bool)
-        middles = _grid((np.arange(2 * _CELLS) + 0.5) / _CELLS - 1.0)
-        _, certain = self.points(_normals(middles))
-        self._useful = certain.reshape(_CELLS, 2, _CELLS, 2).any(axis=(1, 3)).ravel()
+        middles = _normals(_grid((np.arange(2 * _CELLS) + 0.5) / _CELLS - 1.0))
+        found, certain = self.points(middles)
+        if convex:
+            self._useful = _of_cells(certain).any(axis=0)
+        else:
+            best = inverse.solve(middles)[0]
+            certain &= np.abs(found - best).max(axis=0) <= _SAME * np.abs(best).max(axis=0)
+            smooth = misfit <= _SMOOTH * np.abs(samples[0]).max()
+            self._useful = _of_cells(certain).all(axis=0) & smooth
 
     def points(self, normals: Floats) -> tuple[Floats, Bools]:
         """Return points (3, m) for vectors (3, m), none zero, and which are certain (m,)."""
@@ -232,12 +259,21 @@ def _derivative(coefficients: Sequence[Floats]) -> list[Floats]:
     return [first, *(power * each for power, each in enumerate(others, 2))]
 
 
-def _quintics(samples: Floats) -> Floats:
-    """Return the coefficients (21, cells) of the polynomials that fit nine points of each cell.
+def _of_cells(middles: Bools) -> Bools:
+    """Return what holds in the middles of the quarters of each cell, shape (4, cells)."""
+    quarters = middles.reshape(_CELLS, 2, _CELLS, 2)
+    return np.moveaxis(quarters, 2, 1).reshape(-1, 4).T
+
+
+def _quintics(samples: Floats) -> tuple[Floats, Floats]:
+    """Return the polynomials that fit nine points of each cell.
 
     Args:
         samples: Heights and slopes along x and y, for cells from -1 to 1, on a grid of their
             corners and middles, shape (3, 2 n + 1, 2 n + 1).
+
+    Returns:
+        Coefficients, shape (21, cells), and the largest error at the nine points, shape (cells,).
     """
     i, j = np.array(_POWERS).T
     x, y = _grid(np.array([-1.0, 0.0, 1.0]))[:, :, np.newaxis]
@@ -245,10 +281,13 @@ def _quintics(samples: Floats) -> Floats:
         [x**i * y**j, i * x ** np.maximum(i - 1, 0) * y**j, j * x**i * y ** np.maximum(j - 1, 0)]
     )
     last = samples.shape[1] - 2
-    data = [
-        sample[row : row + last : 2, column : column + last : 2].ravel()
-        for sample in samples
-        for row in range(3)
-        for column in range(3)
-    ]
-    return np.asarray(np.linalg.pinv(model) @ np.array(data))
+    data = np.array(
+        [
+            sample[row : row + last : 2, column : column + last : 2].ravel()
+            for sample in samples
+            for row in range(3)
+            for column in range(3)
+        ]
+    )
+    coefficients = np.linalg.pinv(model) @ data
+    return coefficients, np.abs(model @ coefficients - data).max(axis=0)
