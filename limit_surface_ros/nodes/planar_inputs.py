@@ -156,7 +156,8 @@ class PlanarInputs:
     def _to_reference(self, model: SurfaceModel, header: Header) -> RigidTransform | None:
         """Return the transform from a message's frame to axes at the model's reference point.
 
-        A message in the model's own frame is about the reference point already.
+        A message in the model's own frame is about the reference point already; one in any other
+        frame acts at that frame's origin, also where the two frames coincide.
         """
         transform = self._frames.to_model(model.frame_id, header)
         if transform is None or model.reference_point == (0.0, 0.0):

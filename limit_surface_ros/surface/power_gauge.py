@@ -101,7 +101,7 @@ class PowerGauge:
         log_scale = log_scales(values, self._exponents)
         shares = p * np.exp(p * (np.log(values) + 2.0 * log_scale))
         weights = shares / (values * np.exp(2.0 * log_scale) * shares.sum(axis=0))
-        forms = (self._forms.reshape(-1, 9).T @ weights).reshape(3, 3, -1)
+        forms: Floats = (self._forms.reshape(-1, 9).T @ weights).reshape(3, 3, -1)
         # Beside a ridge one term outweighs all others: keep the form regular.
         diagonal = np.einsum("iim->im", forms)
         diagonal += 1e-13 * diagonal.sum(axis=0)

@@ -121,11 +121,11 @@ class SupportTable:
         with np.errstate(over="ignore", under="ignore"):
             self._coefficients = coefficients.astype(np.float32)
         # A cell that proves nothing, as within a corner's cone, is not worth reading.
-        self._useful = np.ones(_CELLS**2, dtype=bool)
+        self._useful: Bools = np.ones(_CELLS**2, dtype=bool)
         middles = _normals(_grid((np.arange(2 * _CELLS) + 0.5) / _CELLS - 1.0))
         found, certain = self.points(middles)
         if convex:
-            self._useful = _of_cells(certain).any(axis=0)
+            self._useful = np.asarray(_of_cells(certain).any(axis=0))
         else:
             best = inverse.solve(middles)[0]
             certain &= np.abs(found - best).max(axis=0) <= _SAME * np.abs(best).max(axis=0)
@@ -262,7 +262,7 @@ def _derivative(coefficients: Sequence[Floats]) -> list[Floats]:
 def _of_cells(middles: Bools) -> Bools:
     """Return what holds in the middles of the quarters of each cell, shape (4, cells)."""
     quarters = middles.reshape(_CELLS, 2, _CELLS, 2)
-    return np.moveaxis(quarters, 2, 1).reshape(-1, 4).T
+    return np.asarray(np.moveaxis(quarters, 2, 1).reshape(-1, 4).T)
 
 
 def _quintics(samples: Floats) -> tuple[Floats, Floats]:
