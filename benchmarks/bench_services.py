@@ -3,17 +3,20 @@
 Usage: python benchmarks/bench_services.py
 
 The nodes run in processes of their own, with the default executor; the calls alternate between
-them. Also measured: 1, 4 and 16 clients, the topic path, and processor time. The lists are of
-unequal length: an empty handler lists nothing.
+them. Also measured: each kind of model, 1, 4 and 16 clients, the topic path, and processor time.
+The lists are of unequal length: an empty handler lists nothing.
 """
 
 from __future__ import annotations
 
+import tempfile
 import threading
 import time
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from bench_maps import kinds
 from geometry_msgs.msg import TwistStamped, WrenchStamped
 from limit_surface_interfaces.srv import (
     EvaluateDecay,
@@ -39,11 +42,14 @@ from node_processes import (
 )
 from rclpy.qos import QoSProfile
 
+from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
 from limit_surface_ros.nodes import convert
 from limit_surface_ros.nodes.service_client import ServiceClient
 
 SINGLE_CALLS = 2000
 BATCH_CALLS = 100
+KIND_CALLS = 400
+KIND_BATCHES = 30
 ROWS = 10_000
 MESSAGES = 4000
 WINDOW = 5
@@ -62,6 +68,8 @@ KINDS = {
         WrenchToTwist,
     )
 }
+SINGLE_GOAL = 1.15
+BATCH_GOAL = 2.5
 NODES = {"ours": "/limit_surface", "empty": "/bare"}
 
 
@@ -71,34 +79,43 @@ def quantiles(times: list[float]) -> tuple[float, float]:
     return float(p50), float(p99)
 
 
-def calls() -> list[Call]:
-    """Return one call of each service."""
-    rng = np.random.default_rng(0)
-    flat = convert.flat_of(rng.normal(size=(ROWS, 3)))
-    times = convert.flat_of(np.linspace(0.0, 5.0, ROWS))
+def map_calls(node: str, model: str, one: int, many: int) -> list[Call]:
+    """Return calls of the services that map, `one` of each and `many` of each batch."""
+    flat = convert.flat_of(np.random.default_rng(0).normal(size=(ROWS, 3)))
     wrench = wrench_message([2.0, 1.0, 0.05])
     twist = TwistStamped()
     twist.header.frame_id = "object"
     twist.twist.linear.x, twist.twist.angular.z = 0.1, 1.0
-    push = Push.Request(friction=0.3)
+    push = Push.Request(friction=0.3, model=model)
     push.contact.header.frame_id = "object"
     push.contact.point.x, push.normal.x, push.velocity.x, push.velocity.y = -0.04, 1.0, 0.1, 0.02
+    single = {
+        "wrench_to_twist": WrenchToTwist.Request(model=model, wrench=wrench),
+        "twist_to_wrench": TwistToWrench.Request(model=model, twist=twist),
+        "push": push,
+    }
+    batch = {
+        "wrenches_to_twists": WrenchesToTwists.Request(model=model, wrenches=flat),
+        "twists_to_wrenches": TwistsToWrenches.Request(model=model, twists=flat),
+    }
+    return [
+        *(Call(node, name, asked, 1, one, SINGLE_GOAL) for name, asked in single.items()),
+        *(Call(node, name, asked, ROWS, many, BATCH_GOAL) for name, asked in batch.items()),
+    ]
+
+
+def calls() -> list[Call]:
+    """Return one call of each service."""
+    times = convert.flat_of(np.linspace(0.0, 5.0, ROWS))
+    wrench = wrench_message([2.0, 1.0, 0.05])
     one, many = SINGLE_CALLS, BATCH_CALLS
     surface, decay = "/limit_surface", "/decay"
     return [
-        Call(surface, "wrench_to_twist", WrenchToTwist.Request(wrench=wrench), 1, one, 1.15),
-        Call(surface, "twist_to_wrench", TwistToWrench.Request(twist=twist), 1, one, 1.15),
-        Call(surface, "push", push, 1, one, 1.15),
-        Call(
-            surface, "wrenches_to_twists", WrenchesToTwists.Request(wrenches=flat), ROWS, many, 2.5
-        ),
-        Call(
-            surface, "twists_to_wrenches", TwistsToWrenches.Request(twists=flat), ROWS, many, 2.5
-        ),
+        *map_calls(surface, "", one, many),
         Call(surface, "list_models", ListModels.Request(), 0, one // 4, None),
-        Call(decay, "time_to_level", TimeToLevel.Request(level=0.1), 1, one, 1.15),
+        Call(decay, "time_to_level", TimeToLevel.Request(level=0.1), 1, one, SINGLE_GOAL),
         Call(decay, "predict_stop", PredictStop.Request(wrench=wrench), 1, one // 4, None),
-        Call(decay, "evaluate", EvaluateDecay.Request(times=times), ROWS, many, 2.5),
+        Call(decay, "evaluate", EvaluateDecay.Request(times=times), ROWS, many, BATCH_GOAL),
         Call(decay, "list_models", ListDecays.Request(), 0, one // 4, None),
     ]
 
@@ -153,6 +170,29 @@ def service_rows(client: ServiceClient) -> None:
             f"| {ours[0] / empty[0]:.2f} | {call.goal or ''} |",
             flush=True,
         )
+
+
+def kind_rows(client: ServiceClient) -> None:
+    """Print round trips on a model of each kind."""
+    print("\n### Each kind of model: p50 over that of an empty handler (p50 [ms])\n")
+    with tempfile.TemporaryDirectory() as folder:
+        names = {}
+        for index, (kind, surface) in enumerate(kinds().items()):
+            names[kind] = f"model_{index}"
+            path = Path(folder) / f"model_{index}.yaml"
+            write_surface_model(SurfaceModel(f"model_{index}", surface), path)
+        served = ["--ros-args", "-r", "__node:=kinds", "-p", f"model_files:=['{folder}']"]
+        with process([*OURS, *served]):
+            for row, (kind, name) in enumerate(names.items()):
+                asked = map_calls("/kinds", name, KIND_CALLS, KIND_BATCHES)
+                if row == 0:
+                    print("| kind |", " | ".join(f"`{call.service}`" for call in asked), "|")
+                    print("|---" * (len(asked) + 1) + "|")
+                cells = []
+                for call in asked:
+                    ours, empty = map(quantiles, call.times(client))
+                    cells.append(f"{ours[0] / empty[0]:.2f} ({ours[0]:.2f})")
+                print(f"| {kind} | {' | '.join(cells)} |", flush=True)
 
 
 def client_rows(client: ServiceClient) -> None:
@@ -295,6 +335,7 @@ def main() -> None:
         ServiceClient("bench") as client,
     ):
         service_rows(client)
+        kind_rows(client)
         client_rows(client)
         topic_rows(client, {"ours": ours.pid, "empty": bare.pid})
 

@@ -1,9 +1,5 @@
-"""A folder of recorded pushes, and fit_catalogue as a process of its own."""
+"""A folder of recorded pushes for fit_catalogue."""
 
-import os
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +9,6 @@ from limit_surface_ros.surface.point_contacts import PointContacts
 from limit_surface_ros.surface.sampling import random_motions
 from limit_surface_ros.surface.scaling import Scaling
 
-REPOSITORY = Path(__file__).parents[1]
 # Short fits, one start after the other.
 OPTIONS = ["--terms", "2", "--starts", "2"]
 
@@ -37,39 +32,3 @@ def matrices(folder: Path, names: list[str]) -> list[list]:
     return [
         read_surface_model(folder / f"{name}.yaml").surface.matrices.tolist() for name in names
     ]
-
-
-def until(condition, what: str, seconds: float = 60.0):
-    """Wait for a condition; return what it gives."""
-    end = time.monotonic() + seconds
-    while not (value := condition()):
-        assert time.monotonic() < end, f"not within {seconds} s: {what}"
-        time.sleep(0.02)
-    return value
-
-
-def started(module: str, *arguments: object, **options) -> subprocess.Popen:
-    """Start a module; see `started_python`."""
-    return started_python("-m", module, *arguments, **options)
-
-
-def started_python(*arguments: object, **options) -> subprocess.Popen:
-    """Start Python with arguments, as the leader of a process group of its own."""
-    paths = [str(REPOSITORY), os.environ.get("PYTHONPATH", "")]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
-    return subprocess.Popen(
-        [sys.executable, *map(str, arguments)],
-        env=environment,
-        start_new_session=True,
-        text=True,
-        **options,
-    )
-
-
-def group_is_gone(group: int) -> bool:
-    """Tell whether no process of a group is left."""
-    try:
-        os.killpg(group, 0)
-    except ProcessLookupError:
-        return True
-    return False

@@ -3,9 +3,10 @@
 import os
 import signal
 import subprocess
-import sys
 
 import pytest
+
+from process_helpers import started_python
 
 PROGRAM = """
 import sys, time
@@ -16,6 +17,9 @@ def work(data):
 
 if __name__ == "__main__":
     with worker_processes(2) as pool:
+        # Both have begun, and leave interrupts to their parent, once they have slept.
+        for begun in [pool.submit(time.sleep, 0.2) for _ in range(2)]:
+            begun.result()
         waiting = [pool.submit(work, bytes(int(sys.argv[1]))) for _ in range(8)]
         print("at work", flush=True)
         waiting[0].result()
@@ -27,17 +31,8 @@ if __name__ == "__main__":
 def test_an_interrupt_ends_the_pool_also_while_tasks_wait_to_be_handed_out(tmp_path, size):
     program = tmp_path / "program.py"
     program.write_text(PROGRAM, encoding="utf-8")
-    process = subprocess.Popen(
-        [sys.executable, str(program), str(size)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
+    process = started_python(program, size, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert process.stdout.readline() == "at work\n"
     os.killpg(process.pid, signal.SIGINT)
-    try:
-        errors = process.communicate(timeout=20)[1]
-    finally:
-        process.kill()
+    errors = process.communicate(timeout=20)[1]
     assert errors.rstrip().endswith("KeyboardInterrupt")

@@ -7,9 +7,10 @@ import subprocess
 
 import pytest
 
-from catalogue_helpers import OPTIONS, group_is_gone, matrices, started, until, write_objects
+from catalogue_helpers import OPTIONS, matrices, write_objects
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.tools import fit_catalogue, fit_surface
+from process_helpers import group_is_gone, started, until
 
 MODULE = "limit_surface_ros.tools.fit_catalogue"
 

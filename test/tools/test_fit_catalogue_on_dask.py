@@ -7,8 +7,9 @@ from importlib.util import find_spec
 
 import pytest
 
-from catalogue_helpers import OPTIONS, matrices, started, started_python, until, write_objects
+from catalogue_helpers import OPTIONS, matrices, write_objects
 from limit_surface_ros.tools import fit_catalogue
+from process_helpers import started, started_python, until
 
 pytestmark = pytest.mark.skipif(
     find_spec("distributed") is None, reason="Dask is not installed (extra: cluster)"

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from catalogue_helpers import group_is_gone, started, until
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.fitting.bootstrap import surfaces_of
@@ -18,6 +17,7 @@ from limit_surface_ros.surface.point_contacts import PointContacts
 from limit_surface_ros.surface.sampling import random_motions
 from limit_surface_ros.surface.scaling import Scaling
 from limit_surface_ros.tools.fit_surface import main
+from process_helpers import group_is_gone, started, until
 
 RECORDED = Path(__file__).parents[3] / "shared" / "data" / "pushing"
 TRIANGLE = PointContacts(

@@ -1,0 +1,58 @@
+"""Programs in process groups of their own, none of which outlives its test."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+REPOSITORY = Path(__file__).parents[1]
+_STARTED: list[subprocess.Popen] = []
+
+
+def until(condition, what: str, seconds: float = 60.0):
+    """Wait for a condition; return what it gives."""
+    end = time.monotonic() + seconds
+    while not (value := condition()):
+        assert time.monotonic() < end, f"not within {seconds} s: {what}"
+        time.sleep(0.02)
+    return value
+
+
+def started(module: str, *arguments: object, **options) -> subprocess.Popen:
+    """Start a module; see `started_python`."""
+    return started_python("-m", module, *arguments, **options)
+
+
+def started_python(*arguments: object, **options) -> subprocess.Popen:
+    """Start Python with arguments, as the leader of a process group of its own."""
+    paths = [str(REPOSITORY), os.environ.get("PYTHONPATH", "")]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
+    process = subprocess.Popen(
+        [sys.executable, *map(str, arguments)],
+        env=environment,
+        start_new_session=True,
+        text=True,
+        **options,
+    )
+    _STARTED.append(process)
+    return process
+
+
+def end_all() -> None:
+    """Kill what is left of the groups of all that was started: tests that fail leave some."""
+    while _STARTED:
+        process = _STARTED.pop()
+        if not group_is_gone(process.pid):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+def group_is_gone(group: int) -> bool:
+    """Tell whether no process of a group is left."""
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return True
+    return False
