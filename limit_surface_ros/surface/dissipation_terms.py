@@ -112,21 +112,25 @@ class PointTerms:
         self.limits = limits
         self._x, self._y = x[:, np.newaxis], y[:, np.newaxis]
         self._reach = max(1.0, float(np.hypot(x, y).max()))
-        self._load_moments = limits * np.array([ones, x, y])
+        zeros = np.zeros_like(x)
+        # Velocities of the points, (2, n, 3) @ twist, and the load of unit forces at them.
+        self._jacobians = np.array([[ones, zeros, -y], [zeros, ones, x]]).transpose(0, 2, 1).copy()
+        self._pulls = limits * np.array([[ones, zeros], [zeros, ones], [-y, x]])
         self._along_moments = limits * np.array([ones, y, y * y])
         self._beside_moments = limits * np.array([ones, x, x * x])
         self._cross_moments = limits * np.array([ones, x, y, x * y])
 
     def gradient(self, twists: Floats) -> Floats:
         """Return the gradient (3, m) of D; a point at rest adds nothing."""
-        total: Floats = np.zeros_like(twists)
-        for part in self._parts(twists.shape[1]):
-            wx, wy = self._velocities(twists, part)
-            speed = self._speeds(wx, wy, twists)
-            wx /= speed
-            wy /= speed
-            total += self._load(wx, wy, part)
-        return total
+        columns = twists.shape[1]
+        loads = []
+        for part in self._parts(columns):
+            velocities = self._jacobians[:, part].reshape(-1, 3) @ twists
+            velocities = velocities.reshape(2, -1, columns)
+            velocities /= self._speeds(velocities[0], velocities[1], twists)
+            pulls = self._pulls[:, :, part].reshape(3, -1)
+            loads.append(pulls @ velocities.reshape(-1, columns))
+        return sum(loads[1:], start=loads[0])
 
     def values(self, twists: Floats) -> Floats:
         """Return D (m,)."""
@@ -152,7 +156,8 @@ class PointTerms:
             slowness = np.divide(1.0, speed, out=speed)
             ex *= slowness
             ey *= slowness
-            gradient += self._load(ex, ey, part)
+            gradient += self._pulls[:, 0, part] @ ex
+            gradient += self._pulls[:, 1, part] @ ey
             # A speed's Hessian is [ey^2, -ex ey; -ex ey, ex^2] / speed if nothing is smoothed.
             bent = slowness * ex
             across = self._cross_moments[:, part] @ (bent * ey)
@@ -176,12 +181,10 @@ class PointTerms:
 
     def corners(self) -> Corners | None:
         """Return the rotations about each support point."""
-        x, y = self._x[:, 0], self._y[:, 0]
-        zeros, ones = np.zeros_like(x), np.ones_like(x)
-        kinks = np.array([y, -x, ones]).T
-        jacobians = np.array([[ones, zeros, -y], [zeros, ones, x]])
+        x, y = self.points.T
+        kinks = np.array([y, -x, np.ones_like(x)]).T
         _, gradients, hessians = self.derivatives(kinks.T, np.zeros(len(kinks)))
-        roots = (self.limits * jacobians).transpose(2, 0, 1)
+        roots = self.limits[:, np.newaxis, np.newaxis] * self._jacobians.swapaxes(0, 1)
         return Corners.of_norms(kinks, roots, gradients, hessians)
 
     def _parts(self, columns: int) -> Iterator[slice]:
@@ -202,14 +205,9 @@ class PointTerms:
         speed += wy * wy
         if softness is not None:
             speed += softness
-        least = np.square(KINK * self._reach * np.abs(twists).max(axis=0))
-        rest = speed <= least
-        if rest.any():
-            speed[rest] = np.inf
+        size = np.abs(twists)
+        least = KINK * self._reach
+        # The least of all speeds is cheaper than one bound for each, and is most often enough.
+        if speed.min(initial=np.inf) <= (least * size.max(initial=0.0)) ** 2:
+            speed[speed <= np.square(least * size.max(axis=0))] = np.inf
         return np.sqrt(speed, out=speed)
-
-    def _load(self, ex: Floats, ey: Floats, part: slice) -> Floats:
-        """Return the load (3, m) of forces m_k (ex, ey), shape (n, m), at the points."""
-        fx = self._load_moments[::2, part] @ ex
-        fy = self._load_moments[:2, part] @ ey
-        return np.array([fx[0], fy[0], fy[1] - fx[1]])

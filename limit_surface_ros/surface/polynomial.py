@@ -36,6 +36,12 @@ if TYPE_CHECKING:
 MONOMIALS = np.array([(i, j, 4 - i - j) for i in range(4, -1, -1) for j in range(4 - i, -1, -1)])
 # The same for the second derivatives: x^2, x y, x m, y^2, y m, m^2.
 _QUADRATICS = [(2, 0, 0), (1, 1, 0), (1, 0, 1), (0, 2, 0), (0, 1, 1), (0, 0, 2)]
+# And for the first derivatives: the above times x, the last three times y, the last times m.
+_CUBICS = [
+    *((i + 1, j, k) for i, j, k in _QUADRATICS),
+    *((i, j + 1, k) for i, j, k in _QUADRATICS[3:]),
+    (0, 0, 3),
+]
 _CHECKED_DIRECTIONS = 2000
 _STARTS = 500
 
@@ -58,6 +64,7 @@ class Polynomial(ScaledSurface):
 
     coefficients: Floats
     scaling: Scaling = field(default_factory=Scaling)
+    _first: Floats = field(init=False, repr=False)
     _second: Floats = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -67,7 +74,9 @@ class Polynomial(ScaledSurface):
             raise ShapeError(f"coefficients must have shape (15,), got {coefficients.shape}")
         coefficients.setflags(write=False)
         object.__setattr__(self, "coefficients", coefficients)
-        object.__setattr__(self, "_second", _second_derivatives(coefficients))
+        second = _second_derivatives(coefficients)
+        object.__setattr__(self, "_second", second)
+        object.__setattr__(self, "_first", _first_derivatives(second))
         directions = even_directions(_CHECKED_DIRECTIONS)
         values = self.value(directions)
         if not values.min() > 0.0:
@@ -82,13 +91,15 @@ class Polynomial(ScaledSurface):
 
     def value(self, load: ArrayLike) -> Floats:
         """Return P at scaled loads (..., 3): below 1 inside the surface, 1 on it; shape (...)."""
-        columns = np.moveaxis(as_vectors("load", load), -1, 0)
-        return np.asarray((self._gradient(columns)[0] * columns).sum(axis=0) / 4.0)[()]
+        array = as_vectors("load", load)
+        columns = array.reshape(-1, 3).T
+        values = (self._gradient(columns) * columns).sum(axis=0) / 4.0
+        return np.asarray(values.reshape(array.shape[:-1]))[()]
 
     def gradient(self, load: ArrayLike) -> Floats:
         """Return the gradient of P at scaled loads (..., 3); shape (..., 3)."""
-        columns = np.moveaxis(as_vectors("load", load), -1, 0)
-        return np.asarray(np.moveaxis(self._gradient(columns)[0], 0, -1))
+        array = as_vectors("load", load)
+        return np.asarray(self._gradient(array.reshape(-1, 3).T).T.reshape(array.shape))
 
     def values(self, loads: Floats) -> Floats:
         """Return the gauge P^(1/4) (m,) of scaled loads (3, m); see `plane_minimum.Gauge`."""
@@ -96,13 +107,13 @@ class Polynomial(ScaledSurface):
 
     def gauge_gradient(self, loads: Floats) -> Floats:
         """Return the gradient (3, m) of the gauge P^(1/4) at scaled loads (3, m)."""
-        gradient = self._gradient(loads)[0]
+        gradient = self._gradient(loads)
         value = (gradient * loads).sum(axis=0) / 4.0
         return np.asarray(gradient * (0.25 * value**-0.75))
 
     def derivatives(self, loads: Floats, _smoothing: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the gauge P^(1/4) of scaled loads (3, m); see `plane_minimum.Gauge`."""
-        gradient, hessian = self._gradient(loads)
+        gradient, hessian = self._gradient(loads), self._hessian(loads)
         value = (gradient * loads).sum(axis=0) / 4.0
         gauge = value**0.25
         outer = gradient[:, np.newaxis] * gradient
@@ -110,11 +121,11 @@ class Polynomial(ScaledSurface):
         return gauge, factor * gradient, factor * (hessian - 0.75 / value * outer)
 
     def _load_factors(self, loads: Floats) -> Floats:
-        values = (self._gradient(loads)[0] * loads).sum(axis=0) / 4.0
+        values = (self._gradient(loads) * loads).sum(axis=0) / 4.0
         return np.asarray(np.sqrt(np.sqrt(values)))
 
     def _twists(self, loads: Floats) -> Floats:
-        return of_unit_length(self._gradient(loads)[0])
+        return of_unit_length(self._gradient(loads))
 
     def _loads(self, twists: Floats) -> Floats:
         return self._inverse.solve(twists)[0]
@@ -134,12 +145,20 @@ class Polynomial(ScaledSurface):
         peaks = PeakInverse(round_surface, directions[:, _STARTS:])
         return FramedInverse(frame, TabulatedInverse(round_surface, peaks, convex=False))
 
-    def _gradient(self, loads: Floats) -> tuple[Floats, Floats]:
-        """Return the gradient (3, ...) and the Hessian (3, 3, ...) at scaled loads (3, ...)."""
+    def _gradient(self, loads: Floats) -> Floats:
+        """Return the gradient (3, m) at scaled loads (3, m)."""
         x, y, m = loads
-        quadratics = np.array([x * x, x * y, x * m, y * y, y * m, m * m])
-        hessian = np.tensordot(self._second, quadratics, axes=1)
-        return np.einsum("ij...,j...->i...", hessian, loads) / 3.0, hessian
+        quadratics = _quadratics(loads)
+        cubics = np.empty((10, loads.shape[1]))
+        np.multiply(quadratics, x, out=cubics[:6])
+        np.multiply(quadratics[3:], y, out=cubics[6:9])
+        np.multiply(quadratics[5], m, out=cubics[9])
+        return np.asarray(self._first @ cubics)
+
+    def _hessian(self, loads: Floats) -> Floats:
+        """Return the Hessian (3, 3, m) at scaled loads (3, m)."""
+        hessian: Floats = self._second.reshape(9, 6) @ _quadratics(loads)
+        return hessian.reshape(3, 3, -1)
 
 
 class _Framed:
@@ -177,3 +196,21 @@ def _second_derivatives(coefficients: Floats) -> Floats:
                 if factor != 0.0:
                     second[i, j, places[left[0], left[1], left[2]]] += factor
     return second
+
+
+def _first_derivatives(second: Floats) -> Floats:
+    """Return C (3, 10) with the gradient C q for the cubic monomials q of `_CUBICS`."""
+    first: Floats = np.zeros((3, 10))
+    places = {powers: place for place, powers in enumerate(_CUBICS)}
+    for place, powers in enumerate(_QUADRATICS):
+        for j in range(3):
+            raised = tuple(power + (axis == j) for axis, power in enumerate(powers))
+            # Of a homogeneous cubic, the gradient's component is x . (its gradient) / 3.
+            first[:, places[raised]] += second[:, j, place] / 3.0
+    return first
+
+
+def _quadratics(loads: Floats) -> Floats:
+    """Return the monomials of `_QUADRATICS` (6, m) of loads (3, m)."""
+    x, y, m = loads
+    return np.array([x * x, x * y, x * m, y * y, y * m, m * m])
