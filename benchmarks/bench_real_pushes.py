@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from limit_surface_ros.errors import LimitSurfaceError
+from limit_surface_ros.errors import LimitSurfaceError, MissingExtraError
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.fitting.automatic import fit_automatically
 from limit_surface_ros.fitting.multi_start import Search
@@ -52,6 +52,8 @@ def test_angle(task: tuple[str, str, list[int]]) -> tuple[float, float]:
             surface = fit_polynomial(
                 training, velocity_weight=1.0, convex=True, scaling=scaling
             ).surface
+        except MissingExtraError:
+            raise
         except LimitSurfaceError:
             return np.nan, 0.0
     else:

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 SEARCH_CELLS = 128
 # exp(-VANISHED) is zero in double precision.
 VANISHED = 800.0
+# Phase in a cell from which on a term is as good as vanished in the next.
+_FASTEST = 1e100
 # Exponentials that are evaluated at a time.
 BLOCK = 1 << 18
 
@@ -322,10 +324,13 @@ class ExponentialSum:
         times = np.linspace(start, end, SEARCH_CELLS + 1)
         width = (end - start) / SEARCH_CELLS
         values = np.abs(self._at(times))
-        growth = np.abs(self.coefficients) * np.abs(self.rates) ** 2
-        curvature = np.exp(np.multiply.outer(times[:-1], self.rates.real)) @ growth
-        highest = np.maximum(values[:-1], values[1:]) + curvature * (width * width / 8.0)
-        return _Cells(times, values, curvature, highest)
+        # In units of the width, so that no square of a rate runs out of numbers.
+        speeds = np.minimum(np.abs(self.rates) * width, _FASTEST)
+        bends = np.exp(np.multiply.outer(times[:-1], self.rates.real)) @ (
+            np.abs(self.coefficients) * speeds**2
+        )
+        highest = np.maximum(values[:-1], values[1:]) + bends / 8.0
+        return _Cells(times, values, bends, highest)
 
     def _last_excess(
         self, start: float, end: float, level: float, resolution: float
@@ -345,7 +350,7 @@ class ExponentialSum:
             if cells.values[cell] > level >= cells.values[cell + 1]:
                 slope = sum((c * rate * exp(rate * left)).real for rate, c in self._pairs)
                 # Steeper than the curvature can undo, x falls through the level once.
-                if abs(slope) > cells.curvature[cell] * width:
+                if abs(slope) * width > cells.bends[cell]:
                     return root_bracket(
                         lambda t: level - abs(self._at_one(t)), left, right, resolution
                     )[1]
@@ -361,13 +366,13 @@ class _Cells(NamedTuple):
     Attributes:
         times: Their ends, shape (n + 1,).
         values: |x| there.
-        curvature: Bound of |x''| within each, shape (n,).
+        bends: Bound of |x''| times the square of the width within each, shape (n,).
         highest: Bound of |x| within each, shape (n,).
     """
 
     times: Floats
     values: Floats
-    curvature: Floats
+    bends: Floats
     highest: Floats
 
 

@@ -87,6 +87,14 @@ def test_after_time_to_level_the_level_is_never_exceeded_and_just_before_it_is(s
         assert np.abs(x(time)) == pytest.approx(level, rel=1e-8)
 
 
+@pytest.mark.parametrize("rate", [1e-300, 1e-170, 1.0, 1e160, 1e300])
+def test_time_to_level_knows_no_unit_of_time(rate):
+    alone = ExponentialSum([-rate], [1.0]).time_to_level(0.1)
+    assert alone * rate == pytest.approx(math.log(10.0))
+    beside_a_faster = ExponentialSum([-1e5 * rate, -rate], [1.0, 1.0]).time_to_level(0.1)
+    assert beside_a_faster * rate == pytest.approx(math.log(10.0))
+
+
 def test_time_to_level_sees_a_late_return_that_a_first_crossing_misses():
     # x falls through zero at once and comes back below it: |x| is above the level again.
     x = ExponentialSum([-1.0 + 2.0j], [1.0])
