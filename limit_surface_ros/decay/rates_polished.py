@@ -22,7 +22,7 @@ from limit_surface_ros.decay.exponential_sum import (
 )
 from limit_surface_ros.decay.minimax import solve_minimax
 from limit_surface_ros.decay.rate_choice import RateChoice, judged
-from limit_surface_ros.decay.response_fits import fine_times
+from limit_surface_ros.decay.response_fits import fit_times
 from limit_surface_ros.errors import SolverError
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ class _Problem:
 
     def __init__(self, response: Target, end: float, rates: Complexes) -> None:
         fastest = float(np.abs(rates.imag).max())
-        self.times = fine_times(response, end, fastest)
+        self.times = fit_times(response, end, fastest)
         self.target = response(self.times)
         self.scale = float(np.abs(self.target).max())
         self.least_decay = LEAST_DECAYS / end

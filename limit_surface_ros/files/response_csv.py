@@ -2,6 +2,7 @@
 
 A first line may name the columns; without names the first column is the time and the second the
 value. Blank lines and lines that begin with `#` are skipped. Times are counted from the first.
+Nothing is assumed between the samples: fits are made on them and errors measured at them.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.decay.targets import PiecewiseLinear
+from limit_surface_ros.decay.targets import Record
 from limit_surface_ros.errors import DataError, FileError
 from limit_surface_ros.files.csv_row import cells_of
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 def read_response(
     path: str | Path, time_column: str | None = None, value_column: str | None = None
-) -> PiecewiseLinear:
+) -> Record:
     """Read a recorded response.
 
     Args:
@@ -60,7 +61,7 @@ def read_response(
     if len(samples) < 2:
         raise FileError(f"{path}: holds {len(samples)} samples; at least 2 are needed")
     try:
-        return PiecewiseLinear(samples[:, 0] - samples[0, 0], samples[:, 1])
+        return Record(samples[:, 0] - samples[0, 0], samples[:, 1])
     except DataError as error:
         raise DataError(f"{path}: {error}") from None
 

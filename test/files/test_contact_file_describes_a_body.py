@@ -71,7 +71,10 @@ def test_every_pressure_is_read(tmp_path, pressure):
         (POINTS, "friction_limits: missing"),
         (POINTS + "friction_limits: [1, 2]\n", "friction_limits: must be an array of 3"),
         (POINTS + "friction_limits: [0, 0, 0]\n", "friction_limits: .* above 0"),
-        (POINTS + "friction_limits: [1, 1, 1]\nnormal_force: 0\n", "normal_force: must be above 0"),
+        (
+            POINTS + "friction_limits: [1, 1, 1]\nnormal_force: 0\n",
+            "normal_force: must be above 0",
+        ),
         (POINTS + "friction_limits: [1, 1, 1]\ncolour: red\n", "colour: is not known"),
         (PATCH + "shape: {kind: star}\n", r"shape.kind: must be one of polygon, .* bitmap"),
         (PATCH + "shape: {kind: disc, radius: -1}\n", "shape.radius: must be above 0"),

@@ -45,6 +45,21 @@ def test_the_delay_system_is_written_with_its_model(tmp_path):
     assert np.abs(value / slope).max() < 1e-10
 
 
+def test_a_record_that_is_a_sum_of_exponentials_is_fitted_exactly_at_its_samples(tmp_path, capsys):
+    record, times = tmp_path / "record.csv", np.linspace(0.0, 4.0, 201)
+    values = 6.0 * np.exp(-1.5 * times) + 2.0 * np.exp(-4.0 * times) * np.cos(9.0 * times)
+    record.write_text("\n".join(f"{t},{x}" for t, x in zip(times, values, strict=True)))
+    output = tmp_path / "model.yaml"
+    arguments = [str(record), "-n", "3", "--method", "esprit", "-o", str(output)]
+    assert fit_decay.main(arguments) == 0
+    model = read_decay_model(output)
+    assert model.max_error < 1e-11
+    np.testing.assert_allclose(model.sum.rates, [-1.5, -4.0 + 9.0j], rtol=1e-9)
+    printed = capsys.readouterr().out
+    assert "at the 201 samples on [0, 4] s" in printed
+    assert re.search(r"^between +up to 4\.9\d*e-03 from the straight lines", printed, re.MULTILINE)
+
+
 @pytest.mark.parametrize("header", ["time,force", ""])
 def test_a_record_gives_back_its_rate_from_its_own_onset(tmp_path, header):
     record = write_record(tmp_path / "record.csv", header=header)
@@ -113,9 +128,61 @@ def test_a_response_that_does_not_decay_is_warned_of(tmp_path, capsys, growth, w
     assert ("warning: the fitted sum does not decay" in capsys.readouterr().err) == warned
 
 
+def write_offset(path, offset, noise=0.0):
+    times = np.linspace(0.0, 4.0, 201)
+    noisy = noise * np.random.default_rng(1).normal(size=201)
+    values = 5.0 * np.exp(-2.0 * times) + offset + noisy
+    path.write_text("\n".join(f"{t},{x}" for t, x in zip(times, values, strict=True)))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("offset", "noise", "warned"),
+    [
+        (1.0, 0.0, True),
+        (-0.4, 0.0, True),
+        (1.0, 0.05, True),
+        (0.0, 0.0, False),
+        (0.0, 0.05, False),
+    ],
+)
+def test_a_record_that_ends_at_a_constant_is_warned_of(tmp_path, capsys, offset, noise, warned):
+    record = write_offset(tmp_path / "record.csv", offset, noise)
+    assert fit_decay.main([str(record), "-n", "2", "--method", "esprit"]) == 0
+    told = capsys.readouterr().err
+    assert ("the record ends at about" in told) == warned
+    assert ("--offset auto" in told) == warned
+
+
+@pytest.mark.parametrize(("given", "expected"), [("auto", 1.0025), ("1.0", 1.0)])
+def test_an_offset_is_taken_away_and_kept_with_the_model(tmp_path, given, expected):
+    record, output = write_offset(tmp_path / "record.csv", 1.0), tmp_path / "model.yaml"
+    arguments = [str(record), "-n", "1", "--method", "esprit", "--offset", given]
+    assert fit_decay.main([*arguments, "--start", "0.2", "-o", str(output)]) == 0
+    model = read_decay_model(output)
+    np.testing.assert_allclose(model.sum.rates, [-2.0], rtol=0.01)
+    assert model.fit["offset"] == pytest.approx(expected, abs=1e-3)
+    assert model.fit["start"] == 0.2
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("auto", "ends at no constant other than 0"),
+        ("x", "--offset must be a number or auto, got 'x'"),
+        ("nan", "--offset must be a number or auto"),
+    ],
+)
+def test_an_offset_that_cannot_be_taken_away_is_refused(tmp_path, capsys, given, message):
+    record = write_offset(tmp_path / "record.csv", 0.0)
+    assert fit_decay.main([str(record), "-n", "1", "--offset", given]) == 2
+    assert message in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (["f1", "-n", "5", "--offset", "1"], "--offset does nothing here: it is for a record"),
         (["nowhere.csv", "-n", "3"], "no such file, and no example has that name"),
         (["f1", "-n", "0"], "terms must be at least 1"),
         (["f4", "-n", "5", "--method", "dde"], "not minimum-phase"),
