@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.checks import Floats
 
+# Sizes of a record's largest value between which fits neither overflow nor lose digits.
+SMALLEST, LARGEST = 1e-100, 1e100
 # Samples count as uniform whose times lie within this part of their distance.
 UNEVEN = 1e-3
 
@@ -90,7 +92,21 @@ class Record(PiecewiseLinear):
     Attributes:
         knots: Times of the samples, shape (n,), increasing from 0 [s].
         values: The samples, shape (n,).
+
+    Raises:
+        RangeError: Their sizes are beyond 1e+-100.
     """
+
+    def __post_init__(self) -> None:
+        """Check sizes too."""
+        super().__post_init__()
+        for name, numbers in (("times", self.knots), ("values", self.values)):
+            size = float(np.abs(numbers).max())
+            if not SMALLEST <= size <= LARGEST:
+                raise RangeError(
+                    f"the largest of the {name} must be between {SMALLEST:g} and {LARGEST:g}, "
+                    f"got {size:g}"
+                )
 
     @property
     def lines(self) -> PiecewiseLinear:

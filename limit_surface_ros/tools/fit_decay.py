@@ -222,6 +222,23 @@ def history(result: DecayFit, given: DecayInput) -> dict[str, Any]:
     return values
 
 
+def model_of(result: DecayFit, given: DecayInput, name: str) -> DecayModel:
+    """Return the fit as a decay model.
+
+    Raises:
+        RangeError: The fitted sum does not decay.
+    """
+    return DecayModel(
+        name=name,
+        sum=result.fit.sum,
+        time_span=(0.0, given.end),
+        norm=result.fit.norm,
+        max_error=result.fit.max_error,
+        system=result.choice.system,
+        fit=history(result, given),
+    )
+
+
 def refuse_options_of_others(options: argparse.Namespace) -> None:
     """Refuse what is for another input or method than the one asked for.
 
@@ -248,6 +265,7 @@ def run(options: argparse.Namespace) -> None:
         if not options.output.parent.is_dir():
             raise RangeError(f"{options.output}: its folder does not exist")
     refuse_options_of_others(options)
+    chosen = method_options(options)
     given = read_input(options)
     given.require_samples_for(options.terms)
     result = fit_decay(
@@ -256,27 +274,19 @@ def run(options: argparse.Namespace) -> None:
         given.end,
         options.method,
         options.norm,
-        method_options(options),
+        chosen,
         show_progress,
     )
     end_progress()
+    # Before the report: a sum that is no decay model, and so not written, is told first.
+    model = None if options.output is None else model_of(result, given, name)
     report(result, given)
     for doubt in doubts(result, given):
         print(f"fit_decay: warning: {doubt}", file=sys.stderr)
-    if options.output is None:
-        return
-    model = DecayModel(
-        name=name,
-        sum=result.fit.sum,
-        time_span=(0.0, given.end),
-        norm=result.fit.norm,
-        max_error=result.fit.max_error,
-        system=result.choice.system,
-        fit=history(result, given),
-    )
-    command = shlex.join(["fit_decay", *options.command])
-    write_decay_model(model, options.output, header=f"Made by: {command}")
-    print(f"{'written':<11} {options.output}")
+    if model is not None:
+        command = shlex.join(["fit_decay", *options.command])
+        write_decay_model(model, options.output, header=f"Made by: {command}")
+        print(f"{'written':<11} {options.output}")
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -8,6 +8,7 @@ import pytest
 
 from limit_surface_ros.decay import examples
 from limit_surface_ros.files.decay_file import read_decay_model
+from limit_surface_ros.files.response_csv import read_response
 from limit_surface_ros.tools import compare_decays, fit_decay
 
 
@@ -85,8 +86,8 @@ def test_a_column_is_chosen_by_its_name(tmp_path):
 @pytest.mark.parametrize(
     ("text", "extra", "message"),
     [
-        ("t,x\n0,1\n1,oops\n", [], "line 3: 'oops' is not a finite number"),
-        ("t,x\n0,1\n1,nan\n", [], "line 3: 'nan' is not a finite number"),
+        ("t,x\n0,1\n1,oops\n", [], "line 3: 'oops' is no finite number\n"),
+        ("t,x\n0,1\n1,nan\n", [], "line 3: 'nan' is no finite number\n"),
         ("t,x\n0,1\n", [], "holds 1 samples"),
         ("", [], "holds no rows"),
         ("t,x\n0,0\n1,1\n", [], "x(0) must not be zero"),
@@ -95,6 +96,11 @@ def test_a_column_is_chosen_by_its_name(tmp_path):
         ("t,x\n0,1\n1,0.5\n", ["--end", "5"], "ends at 1 s"),
         ("t,x\n0,1\n1,0.5\n", ["--end", "-5"], "--end"),
         ("t\n0\n1\n", [], "has no column 2"),
+        ("0;1\n1;0.5\n", [], "cells are separated by commas"),
+        ("t;x\n0,0;1,0\n1,0;0,5\n", [], "line 2: '0;1' is no finite number; cells are separated"),
+        ("t,x\n0,1\n1,1e300\n", [], "line 3: 1e300 is beyond 1e+100"),
+        ("t,x\n0,1e-300\n1,1e-301\n", [], "values must be between 1e-100 and 1e+100"),
+        ("t [h],x\n0,1\n1,0.5\n", [], "times are in 'h' by the column's name 't [h]'"),
         ("t,x\n0,1\n1," + "1" * 200_000, [], "line 3: is not a row of CSV: field larger"),
     ],
 )
@@ -105,6 +111,33 @@ def test_a_bad_record_gives_one_line_and_no_file(tmp_path, capsys, text, extra, 
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1
+    assert not output.exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"), [("t [ms]", 1e-3), ("t (us)", 1e-6), ("stamp_ns", 1e-9), ("t_s", 1.0)]
+)
+def test_times_are_read_in_the_unit_that_their_column_states(tmp_path, name, unit):
+    record = tmp_path / "record.csv"
+    rows = [f"{t / unit},{np.exp(-t)}" for t in np.linspace(0.0, 4.0, 41)]
+    record.write_text("\n".join([f"{name},x", *rows]))
+    assert read_response(record).knots[-1] == pytest.approx(4.0)
+
+
+def test_yaml_is_no_record(tmp_path, capsys):
+    contact = tmp_path / "contact.yaml"
+    contact.write_text("name: el\n")
+    assert fit_decay.main([str(contact), "-n", "1"]) == 2
+    assert "accepted are an example, a CSV file" in capsys.readouterr().err
+
+
+def test_a_sum_that_is_no_decay_model_is_told_before_the_report(tmp_path, capsys):
+    output = tmp_path / "f4.yaml"
+    chosen = ["--method", "dde", "--max-delay", "6", "--allow-unstable"]
+    assert fit_decay.main(["f4", "-n", "5", *chosen, "-o", str(output)]) == 2
+    told = capsys.readouterr()
+    assert "must decay" in told.err
+    assert told.out == ""
     assert not output.exists()
 
 
@@ -188,6 +221,9 @@ def test_an_offset_that_cannot_be_taken_away_is_refused(tmp_path, capsys, given,
         (["f4", "-n", "5", "--method", "dde"], "not minimum-phase"),
         (["f1", "-n", "5", "-o", "no/such/folder/f.yaml"], "folder does not exist"),
         (["f1", "-n", "5", "--method", "dde", "--max-delay", "-1"], "max_delay"),
+        (["f1", "-n", "5", "--method", "dde", "--max-delay", "1", "--degree", "99"], "0 to 30"),
+        (["f1", "-n", "5", "--tail-rate", "1"], "must have a real part below 0"),
+        (["f1", "-n", "5", "--tail-rate=-1-2j"], "Im >= 0"),
         (["f1", "-n", "5", "--topic", "/wrench"], "--topic does nothing here: it is for a bag"),
         (["f1", "-n", "5", "--value-column", "x"], "it is for a CSV file"),
         (["f1", "-n", "5", "--max-delay", "3"], "it is for --method dde"),
@@ -210,6 +246,20 @@ def test_methods_and_terms_are_compared_in_one_table(capsys):
     assert "dde: the response is not minimum-phase" in printed
     errors = {(row[0], row[1]): float(row[2]) for row in rows[2:] if row[2] != "refused"}
     assert errors["| esprit", "7"] < errors["| esprit", "5"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["f1", "--terms", "5", "0"], "--terms must be at least 1 each, got 0"),
+        (["f1", "--tail-rate", "1"], "must have a real part below 0"),
+    ],
+)
+def test_a_comparison_of_nothing_that_could_be_fitted_is_refused(capsys, arguments, message):
+    assert compare_decays.main(arguments) == 2
+    told = capsys.readouterr()
+    assert message in told.err
+    assert told.out == ""
 
 
 def write_bag(folder, storage="SQLITE3", count=201):
