@@ -66,7 +66,7 @@ def read_response(
     )
     unit = 1.0 if names is None else _seconds(path, names[columns[0]])
     samples = np.array(
-        [_numbers(path, number, cells, columns) for number, cells in rows[names is not None :]]
+        [_sample(path, number, cells, columns) for number, cells in rows[names is not None :]]
     )
     if len(samples) < 2:
         raise FileError(f"{path}: holds {len(samples)} samples; at least 2 are needed")
@@ -101,7 +101,7 @@ def _column(path: Path, names: Sequence[str] | None, wanted: str | None, default
     return names.index(wanted)
 
 
-def _numbers(path: Path, line: int, cells: Sequence[str], columns: Sequence[int]) -> list[float]:
+def _sample(path: Path, line: int, cells: Sequence[str], columns: Sequence[int]) -> list[float]:
     numbers = []
     for column in columns:
         if column >= len(cells):

@@ -127,7 +127,7 @@ class Diagnostics:
             level, summary = DiagnosticStatus.WARN, self._strangers[0].sentence
         elif self._namesakes:
             level, summary = DiagnosticStatus.WARN, self._crowd
-        values = {**self._describe(), **_numbers(health, now)}
+        values = {**self._describe(), **_counts_and_times(health, now)}
         values["mismatched peers"] = str(len(self._strangers))
         values["namesakes"] = str(self._namesakes)
         return DiagnosticStatus(
@@ -138,7 +138,7 @@ class Diagnostics:
         )
 
 
-def _numbers(health: Health, now: int) -> dict[str, str]:
+def _counts_and_times(health: Health, now: int) -> dict[str, str]:
     values = {f"accepted {name}": str(count) for name, count in health.accepted.items()}
     for (name, code), count in health.refused.items():
         values[f"refused {name} {code}"] = str(count)

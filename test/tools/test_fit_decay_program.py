@@ -331,7 +331,21 @@ def test_a_bag_that_does_not_hold_what_is_asked_says_what_it_holds(
 def test_a_folder_that_is_no_bag_is_refused(tmp_path, capsys):
     pytest.importorskip("rosbags")
     assert fit_decay.main([str(tmp_path), "--topic", "/x", "-n", "1"]) == 2
-    assert "cannot be read as a bag" in capsys.readouterr().err
+    assert "the folder has no metadata.yaml; accepted are the folder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["bad.mcap", "bad.db3", "bad/metadata.yaml"])
+def test_a_bag_that_is_broken_is_refused_in_one_line(tmp_path, capsys, name):
+    pytest.importorskip("rosbags")
+    file = tmp_path / name
+    file.parent.mkdir(exist_ok=True)
+    file.write_text("x: [")
+    bag = file.parent if file.name == "metadata.yaml" else file
+    assert fit_decay.main([str(bag), "--topic", "/x", "-n", "1"]) == 2
+    told = capsys.readouterr().err
+    assert "cannot be read as a bag" in told
+    assert told.endswith("accepted are the folder of a ROS 2 bag, or an .mcap or .db3 file\n")
+    assert told.count("\n") == 1
 
 
 @pytest.mark.parametrize("program", [fit_decay, compare_decays])
