@@ -5,15 +5,15 @@ SHELL := /bin/bash
 
 PROGRAMS := install/limit_surface_ros/lib/limit_surface_ros
 SHARE := install/limit_surface_ros/share/limit_surface_ros
-# PYTHON=python3.12 make ... chooses the interpreter; ARGS="..." goes to the program that is run.
+# PYTHON=python3.12 make ... chooses the interpreter; ARGS="..." goes where `make help` says.
 ARGS ?=
 
 help: ## Show what can be made
 	@echo "limit_surface_ros: make TARGET [ARGS=\"...\"] [PYTHON=python3.12]"
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|'
 
-demo: ## Start both nodes, call their services, print tables (ARGS go to demo)
-	@scripts/with_ros --isolated -- python3 $(PROGRAMS)/demo $(ARGS)
+demo: ## Start both nodes, call their services, print tables
+	@scripts/with_ros --isolated -- python3 $(PROGRAMS)/demo
 
 run: ## Serve the models of config/ until Ctrl-C (ARGS go to limit_surface_node)
 	@scripts/with_ros --foreground -- python3 $(PROGRAMS)/limit_surface_node \

@@ -30,6 +30,8 @@ MOST_KINKS = 12
 CLOSED_DEGREE = 15
 SAMPLES = 2401
 MOST_CELLS = 60
+# Polynomials of higher degree are not determined by the samples of a cell to any digit.
+MOST_DEGREE = 30
 
 
 def delay_system(
@@ -47,10 +49,12 @@ def delay_system(
         samples: Number of samples on [0, T] if the kernel is sampled.
 
     Raises:
-        RangeError: The maximum delay is not above 0 or the degree is negative.
+        RangeError: The maximum delay is not above 0 or the degree is not within 0 to 30.
         DataError: The kernel cannot be found on these samples.
     """
     span = as_positive("max_delay", max_delay)
+    if degree is not None and not 0 <= degree <= MOST_DEGREE:
+        raise RangeError(f"degree must be a whole number from 0 to {MOST_DEGREE}, got {degree}")
     if isinstance(response, PiecewiseLinear) and len(response.knots) <= MOST_KNOTS:
         try:
             kernel = ClosedKernel(response, span)

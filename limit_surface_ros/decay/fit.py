@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from limit_surface_ros.checks import as_positive
+from limit_surface_ros.decay.exponential_sum import as_rates
 from limit_surface_ros.decay.rate_choice import RateChoice
 from limit_surface_ros.decay.rates_dde import dde_rates
 from limit_surface_ros.decay.rates_esprit import esprit_choices, esprit_rates
@@ -53,12 +54,26 @@ class Options:
         degree: Degree of the kernel's polynomial pieces; a default of the construction if None.
         allow_unstable: Go on with responses that are not minimum-phase (method dde).
         tail_rates: Known complex rates of the response's tail (method neutral), or None.
+
+    Raises:
+        RangeError: A tail rate does not decay, or is not the one of its pair with Im >= 0.
     """
 
     max_delay: float | None = None
     degree: int | None = None
     allow_unstable: bool = False
     tail_rates: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        """Check the tail rates, which some methods look at late or never."""
+        if self.tail_rates is None:
+            return
+        rates = as_rates(self.tail_rates)
+        if (rates.real >= 0.0).any():
+            raise RangeError(
+                "tail rates must have a real part below 0, as -0.4+2j, got "
+                f"{rates[rates.real >= 0.0][0]:g}"
+            )
 
 
 def fit_decay(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import fft, signal
+from scipy import fft
 
 from limit_surface_ros.checks import as_floats
 from limit_surface_ros.decay.targets import require_onset
@@ -91,6 +91,9 @@ def divide_series(numerator: Floats, denominator: Floats) -> Floats:
     count = len(numerator)
     support = int(np.flatnonzero(denominator)[-1]) + 1
     if count * support <= MOST_MULTIPLICATIONS:
+        # Half of what starting a program that fits decays would take.
+        from scipy import signal
+
         quotient: Floats = signal.lfilter([1.0], denominator[:support], numerator)
         return quotient
     return _product(_inverse_series(denominator), numerator, count)

@@ -21,7 +21,7 @@ from scipy import linalg
 from limit_surface_ros.checks import as_floats, as_positive
 from limit_surface_ros.decay.rate_choice import RateChoice, judged, take
 from limit_surface_ros.decay.smoothing import settling_time
-from limit_surface_ros.decay.targets import uniform_times
+from limit_surface_ros.decay.targets import Record, uniform_times
 from limit_surface_ros.errors import DataError, RangeError, ShapeError, SolverError
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def esprit_choices(
         windows = sorted({min(factor * settled, end) for factor in WINDOWS} | {end})
     choices: list[RateChoice] = []
     for length in windows:
-        times = _times(response, length, max(SAMPLES, 8 * terms))
+        times = _times(response, length, terms)
         rates = take(damped(esprit(response(times), float(times[1]), terms), end), terms)
         if len(rates):
             choices.append(judged(rates, response, end, "esprit", None, {"window": length}))
@@ -130,7 +130,14 @@ def damped(rates: Complexes, end: float) -> Complexes:
     return result
 
 
-def _times(response: Target, length: float, samples: int) -> Floats:
+def _times(response: Target, length: float, terms: int) -> Floats:
+    """Return uniform times on [0, length]: a uniform record's own, thinned where they are many."""
+    samples = max(SAMPLES, 8 * terms)
+    if isinstance(response, Record) and response.step(length) is not None:
+        own = response.knots[response.knots <= length]
+        # Fewer make a Hankel matrix that has not the rank of the terms.
+        if len(own) >= 2 * terms + 3:
+            return own[:: max(1, len(own) // samples)]
     try:
         return uniform_times(length, samples, response.breakpoints[:12], stretch=2)
     except DataError:

@@ -22,7 +22,7 @@ from limit_surface_ros.decay.exponential_sum import (
 )
 from limit_surface_ros.decay.minimax import solve_minimax
 from limit_surface_ros.decay.rate_choice import RateChoice, judged
-from limit_surface_ros.decay.response_fits import fine_times
+from limit_surface_ros.decay.response_fits import fit_times
 from limit_surface_ros.errors import SolverError
 
 if TYPE_CHECKING:
@@ -30,16 +30,28 @@ if TYPE_CHECKING:
     from limit_surface_ros.decay.exponential_sum import Complexes
     from limit_surface_ros.decay.targets import Target
 
+# The radius of the trust region is in parts of the rates' mobility, without a unit: of a step at
+# first, at most, and at least.
+FIRST_RADIUS, MOST_RADIUS, LEAST_RADIUS = 0.3, 1.0, 1e-5
+# How it changes after a step that gained more than `GOOD` of what the linearisation promised, at
+# least `FAIR`, or less, and after one that could not be solved.
+GOOD, FAIR = 0.6, 0.2
+WIDENED, NARROWED, HALTED = 2.0, 0.4, 0.25
+# A step that promises less than this part of the error is not worth taking.
+LEAST_HOPE = 1e-4
+# The mobility of a rate that is not damped [1/s].
+LEAST_MOBILITY = 0.3
 MOST_STEPS = 100
 # Polishing ends when this many steps in a row gained less than this part of the error.
 STALL, LEAST_GAIN = 6, 1e-3
-LEAST_RADIUS = 1e-5
 # An error of this part of the response cannot be made smaller.
 ROUNDING = 1e-14
 # Rates are kept left of this many decays over the interval.
 LEAST_DECAYS = 0.4
-# Most refits of the coefficients until no point of the fine grid is worse than those seen.
-ROUNDS = 8
+# Most refits of the coefficients until no point of the fine grid is worse than those seen, by this
+# part; peaks are seen from these parts of the largest error on, in refits and in steps.
+ROUNDS, AGREEMENT = 8, 2e-3
+PEAK_OF_REFIT, PEAK_OF_STEP = 0.7, 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,21 +80,23 @@ def polished_rates(
     """
     problem = _Problem(response, end, start.rates)
     point = problem.fitted(start.rates)
-    radius, stalled, steps = 0.3, 0, 0
+    radius, stalled, steps = FIRST_RADIUS, 0, 0
     while steps < MOST_STEPS and radius > LEAST_RADIUS and stalled < STALL:
         steps += 1
         try:
             trial, predicted = problem.step(point, radius)
         except SolverError:
-            radius *= 0.25
+            radius *= HALTED
             continue
         gain, hope = point.error - trial.error, point.error - predicted
-        if hope <= 1e-4 * point.error or point.error <= ROUNDING * problem.scale:
+        if hope <= LEAST_HOPE * point.error or point.error <= ROUNDING * problem.scale:
             break
         if gain > 0.0:
             stalled = 0 if gain > LEAST_GAIN * point.error else stalled + 1
-        radius *= 2.0 if gain > 0.6 * hope else 1.0 if gain > 0.2 * hope else 0.4
-        radius = min(radius, 1.0)
+        if gain > GOOD * hope:
+            radius = min(WIDENED * radius, MOST_RADIUS)
+        elif gain <= FAIR * hope:
+            radius *= NARROWED
         if gain > 0.0:
             point = trial
         if progress is not None:
@@ -95,11 +109,14 @@ def polished_rates(
 
 
 class _Problem:
-    """A response on a fine grid, of which each step sees the points that matter."""
+    """A response on a fine grid, of which each step sees the points that matter.
+
+    `seen` are those that the present step fits, to which its refits add the worst.
+    """
 
     def __init__(self, response: Target, end: float, rates: Complexes) -> None:
         fastest = float(np.abs(rates.imag).max())
-        self.times = fine_times(response, end, fastest)
+        self.times = fit_times(response, end, fastest)
         self.target = response(self.times)
         self.scale = float(np.abs(self.target).max())
         self.least_decay = LEAST_DECAYS / end
@@ -114,16 +131,21 @@ class _Problem:
             solution = solve_minimax(basis[self.seen], self.target[self.seen])
             errors = np.abs(basis @ solution.weights - self.target)
             worst = float(errors.max())
-            if worst <= 1.002 * solution.value:
+            if worst <= (1.0 + AGREEMENT) * solution.value:
                 break
-            self.seen |= _peaks(errors) & (errors > 0.7 * solution.value)
+            self.seen |= _peaks(errors) & (errors > PEAK_OF_REFIT * solution.value)
         return _Point(rates, solution.weights, worst)
 
     def step(self, point: _Point, radius: float) -> tuple[_Point, float]:
-        """Return the point after one linear program, and the error that it predicts."""
+        """Return the point after one linear program, and the error that it predicts.
+
+        Args:
+            point: Where the sum is linearised.
+            radius: How far a rate may move, in parts of its mobility.
+        """
         x = ExponentialSum.from_weights(point.rates, point.weights)
         errors = self.target - x(self.times)
-        peaks = _peaks(np.abs(errors)) & (np.abs(errors) > 0.3 * point.error)
+        peaks = _peaks(np.abs(errors)) & (np.abs(errors) > PEAK_OF_STEP * point.error)
         seen = self.base | peaks | np.roll(peaks, 2) | np.roll(peaks, -2)
         self.seen = seen
         times = self.times[seen]
@@ -150,8 +172,8 @@ class _Problem:
 
 
 def _mobility(rates: Complexes) -> Floats:
-    """How far a rate may move in a step of radius 1: about as far as it is damped."""
-    mobility: Floats = 0.3 + np.abs(rates.real)
+    """How far a rate may move in a step of radius 1 [1/s]: about as far as it is damped."""
+    mobility: Floats = LEAST_MOBILITY + np.abs(rates.real)
     return mobility
 
 

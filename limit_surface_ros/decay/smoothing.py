@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.decay.targets import PiecewiseLinear
+from limit_surface_ros.decay.targets import PiecewiseLinear, Record
 
 if TYPE_CHECKING:
     from limit_surface_ros.decay.targets import Target
@@ -20,6 +20,9 @@ LEAST_SAMPLES = 60
 # Noise below this part of the onset is left alone.
 TOLERATED = 5e-4
 CELLS_TO_SETTLE, MOST_CELLS = 4, 36
+# A record ends at a constant whose last two tenths have means that differ by no more than this
+# part of it; smaller ones than this part of the onset do not count.
+SAME_LEVEL, LEAST_LEVEL = 0.01, 0.01
 
 
 def noise_level(response: Target) -> float:
@@ -51,6 +54,31 @@ def settling_time(response: Target, end: float) -> float:
     level = max(0.01 * float(sizes.max()), 5.0 * noise_level(response))
     above = np.flatnonzero(sizes > level)
     return float(times[min(above[-1] + 1, len(times) - 1)]) if len(above) else end
+
+
+def resting_level(record: Record, end: float) -> float | None:
+    """Return the constant other than 0 at which a record on [0, end] ends; None if it does not.
+
+    Such a constant is an offset, as a sensor's bias, and no part of a response that decays.
+    """
+    values = record.values[record.knots <= end]
+    tenth = len(values) // 10
+    if tenth < 2:
+        return None
+    before, last = values[-2 * tenth : -tenth], values[-tenth:]
+    level, noise = float(last.mean()), noise_level(record)
+    # Means of noise, and the spread of as many numbers of it.
+    mean_noise, spread = noise / np.sqrt(tenth), 2.0 * SAME_LEVEL * abs(level) + 8.0 * noise
+    stays = (
+        abs(float(before.mean()) - level) <= SAME_LEVEL * abs(level) + 3.0 * mean_noise
+        and float(np.ptp(last)) <= spread
+    )
+    fell = (
+        max(LEAST_LEVEL * abs(float(values[0])), 5.0 * mean_noise)
+        < abs(level)
+        < 0.9 * abs(float(values[0]))
+    )
+    return level if stays and fell else None
 
 
 def smoothed(response: Target, end: float) -> Target:

@@ -16,12 +16,15 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.checks import Floats
 
+# Sizes of a record's largest value between which fits neither overflow nor lose digits.
+SMALLEST, LARGEST = 1e-100, 1e100
+# Samples count as uniform whose times lie within this part of their distance.
+UNEVEN = 1e-3
+
 
 @dataclass(frozen=True, eq=False)
 class PiecewiseLinear:
     """A response that is linear between knots and keeps its last value after them.
-
-    Recorded samples are one of these too: then the knots are the samples.
 
     Attributes:
         knots: Shape (n,), increasing from 0 [s].
@@ -78,6 +81,46 @@ class PiecewiseLinear:
         jumps: Floats = np.diff(self.slopes)
         changes: Floats = jumps[jumps != 0.0]
         return changes
+
+
+@dataclass(frozen=True, eq=False)
+class Record(PiecewiseLinear):
+    """Recorded samples: fits are made on them, and errors measured at them.
+
+    The straight lines between them serve what needs a function, such as a memory kernel.
+
+    Attributes:
+        knots: Times of the samples, shape (n,), increasing from 0 [s].
+        values: The samples, shape (n,).
+
+    Raises:
+        RangeError: Their sizes are beyond 1e+-100.
+    """
+
+    def __post_init__(self) -> None:
+        """Check sizes too."""
+        super().__post_init__()
+        for name, numbers in (("times", self.knots), ("values", self.values)):
+            size = float(np.abs(numbers).max())
+            if not SMALLEST <= size <= LARGEST:
+                raise RangeError(
+                    f"the largest of the {name} must be between {SMALLEST:g} and {LARGEST:g}, "
+                    f"got {size:g}"
+                )
+
+    @property
+    def lines(self) -> PiecewiseLinear:
+        """The straight lines between the samples, a response like any other."""
+        return PiecewiseLinear(self.knots, self.values)
+
+    def step(self, end: float) -> float | None:
+        """Return the distance of the samples on [0, end] [s] if they are uniform, else None."""
+        times = self.knots[self.knots <= end]
+        if len(times) < 2:
+            return None
+        even = np.linspace(0.0, times[-1], len(times))
+        step = float(even[1])
+        return step if float(np.abs(times - even).max()) <= UNEVEN * step else None
 
 
 @dataclass(frozen=True, eq=False)

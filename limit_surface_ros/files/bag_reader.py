@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.checks import Floats
 
+ACCEPTED = "the folder of a ROS 2 bag, or an .mcap or .db3 file"
 WRENCH_FIELDS = tuple(
     f"wrench.{part}.{axis}" for part in ("force", "torque") for axis in ("x", "y", "z")
 )
@@ -67,6 +68,11 @@ def read_topic(path: str | Path, topic: str, fields: Sequence[str] | None = None
     path = Path(path)
     if not path.exists():
         raise FileError(f"{path}: no such bag")
+    if path.is_dir() and not (path / "metadata.yaml").is_file():
+        raise FileError(
+            f"{path}: cannot be read as a bag: the folder has no metadata.yaml; "
+            f"accepted are {ACCEPTED}"
+        )
     name = f"/{topic.lstrip('/')}"
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
@@ -79,7 +85,10 @@ def read_topic(path: str | Path, topic: str, fields: Sequence[str] | None = None
                 for entry, stamp, raw in reader.messages(connections=found)
             ]
     except (AnyReaderError, OSError, KeyError) as error:
-        raise FileError(f"{path}: cannot be read as a bag: {error}") from None
+        reason = str(error).splitlines()[0]
+        raise FileError(
+            f"{path}: cannot be read as a bag: {reason}; accepted are {ACCEPTED}"
+        ) from None
     if not messages:
         raise FileError(f"{path}: has no message on {name}")
     first = messages[0][0]

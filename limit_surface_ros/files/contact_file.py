@@ -3,7 +3,8 @@
 Keys: `schema: 1`, `name`, `frame_id` (default "object"), `reference_point` ("centroid", the
 default, or [x, y] in metres), and one of two descriptions. All lengths are metres, forces newtons.
 
-Support points: `points` ([x, y] each) and `friction_limits` (mu N of each).
+Support points: `points` ([x, y] each) and `friction_limits` (mu N of each); `normal_force` of the
+whole body is optional: it tells at which weight the limits hold.
 
 A patch: `friction_coefficient`, `normal_force` of the whole body, `cells` (about how many, default
 1000) and
@@ -48,7 +49,7 @@ class ContactModel:
         name: Name of the contact.
         frame_id: Frame in which the reference point is given.
         reference_point: About which the surface takes moments [m], shape (2,).
-        normal_force: Weight on the contact [N]; None if the file gives friction limits instead.
+        normal_force: Weight on the contact [N]; None if the file gives friction limits alone.
         surface: Its exact limit surface; another weight is `surface.with_friction_force`.
     """
 
@@ -95,6 +96,7 @@ def _read_points(
 ) -> ContactModel:
     points = section.array("points", (None, 2))
     limits = section.array("friction_limits", (len(points),))
+    force = section.number("normal_force", above=0.0) if "normal_force" in section else None
     chosen = points.mean(axis=0) if reference is None else reference
 
     def build() -> PointContacts:
@@ -102,7 +104,7 @@ def _read_points(
         return PointContacts(arms, limits, natural_scaling(arms, limits))
 
     return ContactModel(
-        name, frame_id, chosen, None, place_errors(section, "friction_limits", build)
+        name, frame_id, chosen, force, place_errors(section, "friction_limits", build)
     )
 
 

@@ -94,6 +94,7 @@ def read_decay_model(path: str | Path) -> DecayModel:
     """
     top = read_yaml(path)
     top.choice("schema", [SCHEMA])
+    _refuse_surfaces(top)
     top.choice("kind", [KIND])
     name = top.text("name")
     rates, coefficients = (_complexes(top, key) for key in ("rates", "coefficients"))
@@ -137,6 +138,20 @@ def write_decay_model(model: DecayModel, path: str | Path, header: str = "") -> 
         "coefficients": _rows(model.sum.coefficients),
     }
     write_yaml(path, values, header)
+
+
+def _refuse_surfaces(top: Section) -> None:
+    """Tell files of limit surfaces and of contacts where they belong."""
+    if "characteristic_length" in top and "rates" not in top:
+        raise top.error(
+            "kind",
+            "this is a limit surface, which the limit_surface node serves and plot_surface "
+            f"draws; a decay model is of kind {KIND}",
+        )
+    if "kind" not in top and ("points" in top or "shape" in top):
+        raise top.error(
+            "kind", f"missing; this is a contact, for fit_surface; a decay model is of kind {KIND}"
+        )
 
 
 def _complexes(section: Section, key: str) -> Any:

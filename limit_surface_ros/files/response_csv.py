@@ -1,28 +1,38 @@
 """Recorded responses in CSV: one row per sample, its time and the value that dies away.
 
 A first line may name the columns; without names the first column is the time and the second the
-value. Blank lines and lines that begin with `#` are skipped. Times are counted from the first.
+value. Columns are separated by commas. Times are seconds, or what the name of their column states,
+as `t [ms]` or `time_us`, and are counted from the first. Blank lines and lines that begin with `#`
+are skipped. Nothing is assumed between samples: fits are made on them, errors measured at them.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.decay.targets import PiecewiseLinear
-from limit_surface_ros.errors import DataError, FileError
+from limit_surface_ros.decay.targets import LARGEST, Record
+from limit_surface_ros.errors import DataError, FileError, RangeError
 from limit_surface_ros.files.csv_row import cells_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
+_SECONDS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+# "t [ms]", "t (ms)", "t_ms"; of units without brackets only those that are known.
+_UNIT = re.compile(
+    rf"[\[(]\s*(?P<bracketed>[^\])]*?)\s*[\])]\s*$|_(?P<suffix>{'|'.join(_SECONDS)})$"
+)
+
+
 def read_response(
     path: str | Path, time_column: str | None = None, value_column: str | None = None
-) -> PiecewiseLinear:
+) -> Record:
     """Read a recorded response.
 
     Args:
@@ -54,15 +64,30 @@ def read_response(
         _column(path, names, time_column, 0),
         _column(path, names, value_column, 1),
     )
+    unit = 1.0 if names is None else _seconds(path, names[columns[0]])
     samples = np.array(
-        [_numbers(path, number, cells, columns) for number, cells in rows[names is not None :]]
+        [_sample(path, number, cells, columns) for number, cells in rows[names is not None :]]
     )
     if len(samples) < 2:
         raise FileError(f"{path}: holds {len(samples)} samples; at least 2 are needed")
     try:
-        return PiecewiseLinear(samples[:, 0] - samples[0, 0], samples[:, 1])
-    except DataError as error:
+        return Record(unit * (samples[:, 0] - samples[0, 0]), samples[:, 1])
+    except (DataError, RangeError) as error:
         raise DataError(f"{path}: {error}") from None
+
+
+def _seconds(path: Path, name: str) -> float:
+    """Return how many seconds the unit has that the name of the column of times states."""
+    stated = _UNIT.search(name)
+    if stated is None:
+        return 1.0
+    unit = stated["bracketed"] or stated["suffix"]
+    if unit not in _SECONDS:
+        raise FileError(
+            f"{path}: times are in {unit!r} by the column's name {name!r}; accepted are "
+            f"{', '.join(_SECONDS)}"
+        )
+    return _SECONDS[unit]
 
 
 def _column(path: Path, names: Sequence[str] | None, wanted: str | None, default: int) -> int:
@@ -76,14 +101,20 @@ def _column(path: Path, names: Sequence[str] | None, wanted: str | None, default
     return names.index(wanted)
 
 
-def _numbers(path: Path, line: int, cells: Sequence[str], columns: Sequence[int]) -> list[float]:
+def _sample(path: Path, line: int, cells: Sequence[str], columns: Sequence[int]) -> list[float]:
     numbers = []
     for column in columns:
         if column >= len(cells):
-            raise FileError(f"{path}: line {line}: has no column {column + 1}")
-        if not _is_number(cells[column]) or not math.isfinite(float(cells[column])):
-            raise FileError(f"{path}: line {line}: {cells[column]!r} is not a finite number")
-        numbers.append(float(cells[column]))
+            raise FileError(
+                f"{path}: line {line}: has no column {column + 1}; cells are separated by commas"
+            )
+        number = float(cells[column]) if _is_number(cells[column]) else math.nan
+        if not math.isfinite(number):
+            hint = "; cells are separated by commas" if set(cells[column]) & set(";\t ") else ""
+            raise FileError(f"{path}: line {line}: {cells[column]!r} is no finite number{hint}")
+        if abs(number) > LARGEST:
+            raise FileError(f"{path}: line {line}: {cells[column]} is beyond {LARGEST:g}")
+        numbers.append(number)
     return numbers
 
 

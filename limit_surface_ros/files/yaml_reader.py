@@ -177,7 +177,7 @@ class Section:
         value = self._get(key, default)
         if value is default:
             return default
-        array = self._numbers(key, value, len(shape) + 1)
+        array = self._nested_floats(key, value, len(shape) + 1)
         fits = array.ndim == len(shape) and all(
             given > 0 if wanted is None else given == wanted
             for given, wanted in zip(array.shape, shape, strict=True)
@@ -222,11 +222,12 @@ class Section:
             accepted = ", ".join(self._known)
             raise self.error(str(unknown[0]), f"is not known here; accepted are {accepted}")
 
-    def _numbers(self, key: str, value: Any, levels: int) -> Floats:
+    def _nested_floats(self, key: str, value: Any, levels: int) -> Floats:
         """Return nested lists of numbers as an array; deeper than `levels` they are no numbers."""
         if levels and isinstance(value, list):
             parts = [
-                self._numbers(f"{key}[{i}]", item, levels - 1) for i, item in enumerate(value)
+                self._nested_floats(f"{key}[{i}]", item, levels - 1)
+                for i, item in enumerate(value)
             ]
             if len({part.shape for part in parts}) > 1:
                 raise self.error(key, "its rows must have one length")

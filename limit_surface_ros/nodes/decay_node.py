@@ -18,7 +18,7 @@ from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.nodes import convert, frames, planar_inputs, spin
 from limit_surface_ros.nodes.model_host import model_settings
 from limit_surface_ros.nodes.model_info import Listing, decay_info
-from limit_surface_ros.nodes.model_node import ModelNode
+from limit_surface_ros.nodes.model_node import COMMON_SETTINGS, ModelNode
 from limit_surface_ros.nodes.onset import Onset
 from limit_surface_ros.nodes.onset_stream import OnsetStream
 from limit_surface_ros.nodes.planar_inputs import PlanarInputs
@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
 NAME = "decay"
-# A measurement stamped later than this is no clock a little ahead but a wrong stamp [ns].
+# A stamp later than this is no clock a little ahead [ns]: of a measurement it is wrong, an onset
+# may be meant so.
 LATEST_AHEAD = SECOND
 SETTINGS = (
     *model_settings("config/decay", "decay models"),
@@ -152,6 +153,26 @@ class DecayNode(ModelNode[DecayModel]):
         self._onset = onset
         self._publish_forecast()
         self._start_stream()
+        self._report_odd_time()
+
+    def _report_odd_time(self) -> None:
+        """Tell of an onset that is long in coming or already over: a clock may be wrong.
+
+        The one is waited for, of the other nothing is published; both are forecast.
+        """
+        age = (self._now() - self._onset.start) * 1e-9
+        if -age * SECOND > LATEST_AHEAD:
+            self.report(
+                "onset in the future",
+                f"an onset's stamp lies {-age:.3g} s in the future: its load is published from "
+                "then on",
+            )
+        elif age > self._end():
+            self.report(
+                "onset over",
+                f"an onset's stamp lies {age:.3g} s in the past, where its load has died away: "
+                "only its forecast is published",
+            )
 
     def _measure(self, message: WrenchStamped) -> None:
         load = np.array(convert.wrench_components(message.wrench))
@@ -263,7 +284,8 @@ class DecayNode(ModelNode[DecayModel]):
 
 def main() -> int:
     """Run the node until SIGINT or SIGTERM; return the exit code."""
-    return spin.run(lambda: [DecayNode()], __doc__, sys.argv)
+    tables = {NAME: [*SETTINGS, *COMMON_SETTINGS]}
+    return spin.run(lambda: [DecayNode()], tables, __doc__, sys.argv)
 
 
 if __name__ == "__main__":

@@ -66,6 +66,8 @@ class Diagnostics:
         self._peers = peers
         self._strangers: list[Mismatch] = []
         self._looks: dict[tuple[str, tuple[int, ...]], int] = {}
+        self._namesakes = 0
+        self._crowded = 0
         self._describe = describe
         self._parameters = parameters
         self._publisher = node.create_publisher(
@@ -80,10 +82,27 @@ class Diagnostics:
 
     def _publish(self) -> None:
         self._look_at_peers()
+        self._look_at_namesakes()
         message = DiagnosticArray(status=[self._status()])
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)
         self._health.restart_window()
+
+    def _look_at_namesakes(self) -> None:
+        count = self._peers.namesakes()
+        self._crowded = self._crowded + 1 if count else 0
+        self._namesakes = count
+        # At the first look a node that has just ended may still be in the graph.
+        if self._crowded == 2:
+            self._node.get_logger().warning(self._crowd)
+
+    @property
+    def _crowd(self) -> str:
+        return (
+            f"{self._namesakes} other node(s) named {self._node.get_fully_qualified_name()}: all "
+            "of them answer (one that was killed counts for some seconds); give one another "
+            "name, -r __node:=NAME, or namespace, -r __ns:=/NAMESPACE"
+        )
 
     def _look_at_peers(self) -> None:
         before, self._looks = self._looks, {}
@@ -106,8 +125,11 @@ class Diagnostics:
             level, summary = DiagnosticStatus.WARN, f"{health.news} inputs refused"
         elif self._strangers:
             level, summary = DiagnosticStatus.WARN, self._strangers[0].sentence
-        values = {**self._describe(), **_numbers(health, now)}
+        elif self._namesakes:
+            level, summary = DiagnosticStatus.WARN, self._crowd
+        values = {**self._describe(), **_counts_and_times(health, now)}
         values["mismatched peers"] = str(len(self._strangers))
+        values["namesakes"] = str(self._namesakes)
         return DiagnosticStatus(
             level=level,
             name=self._node.get_fully_qualified_name().lstrip("/"),
@@ -116,7 +138,7 @@ class Diagnostics:
         )
 
 
-def _numbers(health: Health, now: int) -> dict[str, str]:
+def _counts_and_times(health: Health, now: int) -> dict[str, str]:
     values = {f"accepted {name}": str(count) for name, count in health.accepted.items()}
     for (name, code), count in health.refused.items():
         values[f"refused {name} {code}"] = str(count)

@@ -1,17 +1,23 @@
-"""Program: the `limit_surface` and the `decay` node in one process and one executor."""
+"""The `limit_surface` and the `decay` node in one process and one executor.
+
+A parameter given as -p NAME:=VALUE goes to both; -p limit_surface:NAME:=VALUE and
+-p decay:NAME:=VALUE, or a parameter file, address one.
+"""
 
 from __future__ import annotations
 
 import sys
 
-from limit_surface_ros.nodes import spin
+from limit_surface_ros.nodes import decay_node, spin, surface_node
 from limit_surface_ros.nodes.decay_node import DecayNode
+from limit_surface_ros.nodes.model_node import COMMON_SETTINGS
 from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
 
 
 def main() -> int:
     """Run both nodes until SIGINT or SIGTERM; return the exit code."""
-    return spin.run(lambda: [LimitSurfaceNode(), DecayNode()], __doc__, sys.argv)
+    tables = {node.NAME: [*node.SETTINGS, *COMMON_SETTINGS] for node in (surface_node, decay_node)}
+    return spin.run(lambda: [LimitSurfaceNode(), DecayNode()], tables, __doc__, sys.argv)
 
 
 if __name__ == "__main__":

@@ -89,7 +89,8 @@ class ModelHost(Generic[Model]):
     def summary(self) -> str:
         """What is loaded, for people."""
         models = self.models
-        return f"{len(models)} loaded: {models.listed()}; default {models.default}"
+        count = f"{len(models)} loaded from {self.names[0]}"
+        return f"{count}: {models.listed()}; default {models.default}"
 
     def _prepare(self, values: Values) -> Callable[[], None]:
         files, default = (values[name] for name in self.names)

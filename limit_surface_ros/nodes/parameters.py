@@ -11,9 +11,10 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
+from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.parameter import Parameter
 
-from limit_surface_ros.errors import LimitSurfaceError
+from limit_surface_ros.errors import LimitSurfaceError, RangeError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable
@@ -145,7 +146,23 @@ def describe(setting: Setting) -> ParameterDescriptor:
 
 
 def _declared(node: Node, setting: Setting) -> Any:
-    """Declare one parameter and return its value."""
+    """Declare one parameter and return its value.
+
+    Raises:
+        RangeError: A whole number was given for one with a point, which ROS takes for two types.
+        ParameterException: The value has another wrong type or lies outside the range.
+    """
+    try:
+        return _declare(node, setting)
+    except InvalidParameterTypeException as error:
+        given = node.handle.get_parameters(Parameter).get(setting.name)
+        if isinstance(setting.default, float) and given is not None and type(given.value) is int:
+            value = f"{setting.name} must have a decimal point: write {given.value}.0"
+            raise RangeError(value) from error
+        raise
+
+
+def _declare(node: Node, setting: Setting) -> Any:
     if setting.default != []:
         return node.declare_parameter(setting.name, setting.default, describe(setting)).value
     # rclpy takes an empty list for one of bytes: declare the type, then set the value.
@@ -157,10 +174,7 @@ def _declared(node: Node, setting: Setting) -> Any:
 
 
 def _warn_of_unknown(node: Node, known: Iterable[str]) -> None:
-    """Tell of values given at start that no parameter takes: most are misspelt.
-
-    Those that are like no parameter may be another node's: files and command lines are shared.
-    """
+    """Warn of values given at start that no parameter takes: most are misspelt."""
     # Parameters of QoS are declared when a topic is.
     given = [name for name in node.handle.get_parameters(Parameter) if "qos_overrides" not in name]
     for name in given:
@@ -168,10 +182,8 @@ def _warn_of_unknown(node: Node, known: Iterable[str]) -> None:
             continue
         sentence = f"parameter {name!r} is not known here and is ignored"
         like = difflib.get_close_matches(name, known, n=1, cutoff=0.75)
-        if like:
-            node.get_logger().warning(f"{sentence}; did you mean {like[0]!r}?")
-        else:
-            node.get_logger().info(sentence)
+        meant = f"; did you mean {like[0]!r}?" if like else ""
+        node.get_logger().warning(f"{sentence}{meant}")
 
 
 def _plain(value: Any) -> Any:

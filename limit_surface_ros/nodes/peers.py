@@ -1,4 +1,4 @@
-"""Who is on a node's topics and gets or gives nothing: peers of another type or of unlike QoS.
+"""Who is about that should not be: namesakes, and peers of another type or of unlike QoS.
 
 Asked of the graph once a diagnostics period. rclpy's event handlers would say it at once, but they
 take part in every wait of an executor: with them a call of a service takes a tenth longer.
@@ -76,6 +76,11 @@ class Peers:
                 lambda theirs: _reason(_as_told(publisher.qos_profile), theirs),
             )
         )
+
+    def namesakes(self) -> int:
+        """Return how many other nodes have this node's name: each call and input goes to all."""
+        own = self._node.get_name(), self._node.get_namespace()
+        return max(0, self._node.get_node_names_and_namespaces().count(own) - 1)
 
     def mismatched(self) -> Iterator[Mismatch]:
         """Yield the peers that are there now and cannot be heard or served."""

@@ -6,13 +6,14 @@ ROS-free: `parameters` turns rows into declared parameters with descriptors.
 from __future__ import annotations
 
 import math
+import textwrap
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from limit_surface_ros.errors import LimitSurfaceError, RangeError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,25 @@ class Setting:
         """What is accepted beyond a range, for people."""
         return f"one of {', '.join(self.choices)}" if self.choices else ""
 
+    @property
+    def accepted(self) -> str:
+        """What is accepted, for people; empty: anything of the default's type."""
+        lowest = "" if self.minimum is None else f"from {self.minimum:g}"
+        highest = "" if self.maximum is None else f"to {self.maximum:g}"
+        at_start = "at start only" if self.read_only else ""
+        span = " ".join(part for part in (lowest, highest) if part)
+        return "; ".join(part for part in (span, self.constraints, at_start) if part)
+
+    @property
+    def written(self) -> str:
+        """The default as it is written on a command line."""
+        texts = self.default if isinstance(self.default, list) else None
+        if texts is not None:
+            return "[" + ", ".join(f"'{text}'" for text in texts) + "]"
+        if isinstance(self.default, bool):
+            return str(self.default).lower()
+        return str(self.default) or "''"
+
     def verify(self, value: Any) -> None:
         """Check a value.
 
@@ -64,3 +84,19 @@ class Setting:
                 self.check(value)
             except LimitSurfaceError as error:
                 raise RangeError(f"{self.name}: {error}") from error
+
+
+def help_of(node: str, table: Iterable[Setting]) -> str:
+    """Return a node's parameters for `--help`: name, default, meaning and what is accepted."""
+    lines = [f"parameters of {node}, with their defaults:"]
+    for setting in table:
+        lines.append(f"  {setting.name} := {setting.written}")
+        meaning = (
+            f"{setting.description} ({setting.accepted})"
+            if setting.accepted
+            else (setting.description)
+        )
+        lines += textwrap.wrap(
+            meaning, 92, initial_indent=" " * 6, subsequent_indent=" " * 6, break_on_hyphens=False
+        )
+    return "\n".join(lines)

@@ -25,10 +25,10 @@ from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
 from limit_surface_ros.errors import FileError, LimitSurfaceError
-from limit_surface_ros.nodes.settings import Setting
+from limit_surface_ros.nodes.settings import Setting, help_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from rclpy.node import Node
 
@@ -36,6 +36,15 @@ ENDING = (signal.SIGINT, signal.SIGTERM)
 # What a user gets wrong at start is told in one line, without a traceback. rcl's errors, unknown
 # ROS arguments among them, are RuntimeErrors.
 _CONFIGURATION_ERRORS = (LimitSurfaceError, ParameterException, RuntimeError)
+_EPILOG = """\
+Parameters, remappings and the namespace are given as ROS arguments:
+  --ros-args -p NAME:=VALUE --params-file FILE -r FROM:=TO -r __ns:=/NAMESPACE
+such as
+  --ros-args -p "model_files:=['/path/to/model.yaml']" -p normal_force:=5.0"""
+_ADDRESSED = (
+    "parameters go to all nodes of the process; -p NODE:NAME:=VALUE, such as "
+    "-p limit_surface:model_files:=[...], and parameter files address one"
+)
 # What names the folder of the log, for rcl.
 _HOMES = ("ROS_LOG_DIR", "ROS_HOME", "HOME")
 # The middleware is still sending a large answer when the call is over; it is lost if the node is
@@ -50,12 +59,18 @@ EXECUTOR = Setting(
 )
 
 
-def run(make_nodes: Callable[[], Sequence[Node]], description: str, argv: Sequence[str]) -> int:
+def run(
+    make_nodes: Callable[[], Sequence[Node]],
+    tables: Mapping[str, Iterable[Setting]],
+    description: str,
+    argv: Sequence[str],
+) -> int:
     """Run the nodes of one process until they are told to end.
 
     Args:
         make_nodes: Makes the nodes; called with ROS initialised. Errors end the process with a
             line in the log.
+        tables: Each node's parameters by its name, for `--help`.
         description: What the program is, for `--help`.
         argv: The command line, the program's name first.
 
@@ -70,19 +85,26 @@ def run(make_nodes: Callable[[], Sequence[Node]], description: str, argv: Sequen
         signal.signal(number, lambda *_: None)
     parser = argparse.ArgumentParser(
         description=description,
-        epilog="Parameters, remappings and the namespace are given as ROS arguments: "
-        "--ros-args -p NAME:=VALUE --params-file FILE -r FROM:=TO -r __ns:=/NAMESPACE",
+        epilog="\n\n".join([_EPILOG, *(help_of(name, table) for name, table in tables.items())]),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     try:
-        parser.parse_args(remove_ros_args(list(argv))[1:])
+        _, unknown = parser.parse_known_args(remove_ros_args(list(argv))[1:])
+        if unknown:
+            parser.error(
+                f"{unknown[0]!r} is not accepted here; files of models are given as a parameter: "
+                f"--ros-args -p \"model_files:=['{unknown[0]}']\""
+            )
         logs = "--disable-external-lib-logs" not in argv
         if logs and not any(os.environ.get(name) for name in _HOMES):
             raise FileError(f"ROS 2 finds no place for its log: set one of {', '.join(_HOMES)}")
         rclpy.init(args=list(argv), signal_handler_options=SignalHandlerOptions.NO)
         nodes = make_nodes()
     except _CONFIGURATION_ERRORS as error:
-        rclpy.logging.get_logger("limit_surface_ros").fatal(f"cannot start: {error}")
+        sentence = f"cannot start: {error}"
+        if isinstance(error, FileError) and len(tables) > 1:
+            sentence += f" ({_ADDRESSED})"
+        rclpy.logging.get_logger("limit_surface_ros").fatal(sentence)
         rclpy.try_shutdown()
         return 1
     executor = _executor(nodes[0])

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.decay.targets import PiecewiseLinear
+from limit_surface_ros.decay.targets import PiecewiseLinear, Record
 from limit_surface_ros.plots.canvas import BLACK, BLUE, SKY, VERMILION, new_figure
 
 if TYPE_CHECKING:
@@ -49,7 +49,10 @@ def draw_decay(model: DecayModel, target: Target | None = None) -> Figure:
 
 
 def _draw_fit(axes: Axes, model: DecayModel, target: Target | None, times: Floats) -> None:
-    if target is not None:
+    if isinstance(target, Record):
+        samples = _samples(target, times[-1])
+        axes.plot(samples, target(samples), ".", color=SKY, markersize=8, label="samples")
+    elif target is not None:
         axes.plot(times, target(times), color=SKY, linewidth=4, label="response")
     axes.plot(times, model.sum(times), color=VERMILION, label="model")
     axes.set(title="response and model", xlabel="t [s]", ylabel="x", xlim=(0.0, times[-1]))
@@ -58,7 +61,11 @@ def _draw_fit(axes: Axes, model: DecayModel, target: Target | None, times: Float
 
 def _draw_error(axes: Axes, model: DecayModel, target: Target | None, times: Floats) -> None:
     if target is not None:
-        axes.plot(times, model.sum(times) - target(times), color=BLUE, linewidth=1, label="error")
+        # Of a record nothing is known between its samples.
+        known = _samples(target, times[-1]) if isinstance(target, Record) else times
+        style = ".-" if isinstance(target, Record) else "-"
+        error = model.sum(known) - target(known)
+        axes.plot(known, error, style, color=BLUE, linewidth=1, markersize=4, label="error")
     for sign, label in ((1.0, "bound in the file"), (-1.0, None)):
         axes.axhline(
             sign * model.max_error, color=BLACK, linewidth=0.8, linestyle="--", label=label
@@ -73,6 +80,11 @@ def _draw_error(axes: Axes, model: DecayModel, target: Target | None, times: Flo
         ylim=(-1.6 * model.max_error or -1.0, 1.6 * model.max_error or 1.0),
     )
     axes.legend(loc="upper right", ncols=2)
+
+
+def _samples(record: Record, end: float) -> Floats:
+    times: Floats = record.knots[record.knots <= end]
+    return times
 
 
 def _draw_rates(axes: Axes, model: DecayModel) -> None:

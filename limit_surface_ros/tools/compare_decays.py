@@ -11,7 +11,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from limit_surface_ros.decay.fit import METHODS, fit_decay
-from limit_surface_ros.errors import LimitSurfaceError
+from limit_surface_ros.errors import LimitSurfaceError, RangeError
 from limit_surface_ros.tools.decay_input import add_input_options, read_input
 from limit_surface_ros.tools.fit_decay import add_method_options, beyond, method_options
 from limit_surface_ros.tools.program import run_program
@@ -20,6 +20,7 @@ from limit_surface_ros.tools.progress import progress_bar
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from limit_surface_ros.decay.fit import Options
     from limit_surface_ros.tools.decay_input import DecayInput
 
 EXAMPLES = """examples:
@@ -49,14 +50,14 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
-def compare(options: argparse.Namespace, given: DecayInput, method: str, terms: int) -> list[str]:
+def compare(chosen: Options, given: DecayInput, method: str, terms: int) -> list[str]:
     """Return one row of the table.
 
     Raises:
         LimitSurfaceError: The method cannot be used on this response.
     """
     given.require_samples_for(terms)
-    result = fit_decay(given.target, terms, given.end, method, options=method_options(options))
+    result = fit_decay(given.target, terms, given.end, method, options=chosen)
     x, after = result.fit.sum, beyond(result, given)
     return [
         method,
@@ -70,6 +71,9 @@ def compare(options: argparse.Namespace, given: DecayInput, method: str, terms: 
 
 def run(options: argparse.Namespace) -> None:
     """Fit by each method with each number of terms, and print the table."""
+    if min(options.terms) < 1:
+        raise RangeError(f"--terms must be at least 1 each, got {min(options.terms)}")
+    chosen = method_options(options)
     given = read_input(options)
     pairs = [(method, terms) for terms in options.terms for method in options.methods]
     rows: list[list[str]] = []
@@ -77,7 +81,7 @@ def run(options: argparse.Namespace) -> None:
     with progress_bar("fits") as progress:
         for done, (method, terms) in enumerate(pairs, start=1):
             try:
-                rows.append(compare(options, given, method, terms))
+                rows.append(compare(chosen, given, method, terms))
             except LimitSurfaceError as error:
                 refusals[method] = str(error)
                 rows.append([method, str(terms), "refused", "", "", ""])

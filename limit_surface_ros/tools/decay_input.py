@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,10 +10,12 @@ import numpy as np
 
 from limit_surface_ros.checks import as_positive
 from limit_surface_ros.decay.examples import EXAMPLES, example
-from limit_surface_ros.decay.targets import PiecewiseLinear
-from limit_surface_ros.errors import DataError, FileError
+from limit_surface_ros.decay.smoothing import resting_level
+from limit_surface_ros.decay.targets import Record
+from limit_surface_ros.errors import DataError, FileError, RangeError
 from limit_surface_ros.files.bag_reader import read_topic
 from limit_surface_ros.files.response_csv import read_response
+from limit_surface_ros.tools.given_options import MODEL_SUFFIXES
 
 if TYPE_CHECKING:
     import argparse
@@ -31,18 +34,33 @@ class DecayInput:
         target: The response.
         end: End of the fitted interval [s].
         horizon: Up to where errors beyond the interval are measured [s]; not below `end`.
-        samples: How many samples a record has on the interval; None for an example.
+        start: Of the response within its record [s].
+        offset: What has been taken away from the record's values.
     """
 
     def __init__(
-        self, source: str, target: Target, end: float, horizon: float, samples: int | None = None
+        self,
+        source: str,
+        target: Target,
+        end: float,
+        horizon: float,
+        start: float = 0.0,
+        offset: float = 0.0,
     ) -> None:
         """Take what has been read."""
         self.source = source
         self.target = target
         self.end = end
         self.horizon = max(horizon, end)
-        self.samples = samples
+        self.start = start
+        self.offset = offset
+
+    @property
+    def samples(self) -> int | None:
+        """How many samples a record has on the interval; None for an example."""
+        if not isinstance(self.target, Record):
+            return None
+        return int(np.count_nonzero(self.target.knots <= self.end))
 
     def require_samples_for(self, terms: int) -> None:
         """Refuse more terms than the samples can determine: each has a rate and a coefficient.
@@ -78,6 +96,12 @@ def add_input_options(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="the onset, counted from the record's first sample [s]; what is before is left out",
     )
+    parser.add_argument(
+        "--offset",
+        metavar="X",
+        help="what to take away from a record's values, such as a sensor's bias; `auto`: the "
+        "constant at which the record ends",
+    )
     parser.add_argument("--time-column", metavar="NAME", help="default: the first column")
     parser.add_argument("--value-column", metavar="NAME", help="default: the second column")
     parser.add_argument("--topic", metavar="NAME", help="of a bag")
@@ -94,7 +118,7 @@ def read_input(options: argparse.Namespace) -> DecayInput:
     Raises:
         FileError: The input is neither an example nor a readable record.
         DataError: The record is no response.
-        RangeError: The end is not above 0.
+        RangeError: The end is not above 0, or the offset is no number.
     """
     end = None if options.end is None else as_positive("--end", options.end)
     if options.input in EXAMPLES:
@@ -108,14 +132,19 @@ def read_input(options: argparse.Namespace) -> DecayInput:
         )
     if options.topic is not None:
         record = record_of_bag(path, options.topic, options.field)
+    elif path.suffix.lower() in MODEL_SUFFIXES:
+        raise FileError(
+            f"{path}: is YAML and no record; accepted are an example, a CSV file of times and "
+            "values, and a bag (fit_surface fits contacts, plot_decay draws decay models)"
+        )
     elif path.is_dir() or path.suffix in (".mcap", ".db3"):
         raise FileError(f"{path}: is a bag: say which topic to read, with --topic")
     else:
         record = read_response(path, options.time_column, options.value_column)
-    return of_record(str(path), after(record, options.start), end)
+    return of_record(str(path), record, end, options.start, options.offset)
 
 
-def record_of_bag(path: Path, topic: str, field: str | None) -> PiecewiseLinear:
+def record_of_bag(path: Path, topic: str, field: str | None) -> Record:
     """Return a number of a topic's messages over time, from the first message on.
 
     Raises:
@@ -124,10 +153,10 @@ def record_of_bag(path: Path, topic: str, field: str | None) -> PiecewiseLinear:
         DataError: The samples are no response.
     """
     recorded = read_topic(path, topic, None if field is None else [field])
-    return PiecewiseLinear(recorded.times - recorded.times[0], recorded.values[:, 0])
+    return Record(recorded.times - recorded.times[0], recorded.values[:, 0])
 
 
-def after(record: PiecewiseLinear, start: float) -> PiecewiseLinear:
+def after(record: Record, start: float) -> Record:
     """Return what a record holds from `start` [s] on, its times counted from there.
 
     Raises:
@@ -140,17 +169,58 @@ def after(record: PiecewiseLinear, start: float) -> PiecewiseLinear:
             f"which ends at {record.knots[-1]:g} s"
         )
     times = record.knots[kept]
-    return PiecewiseLinear(times - times[0], record.values[kept])
+    return Record(times - times[0], record.values[kept])
 
 
-def of_record(source: str, record: PiecewiseLinear, end: float | None) -> DecayInput:
-    """Return a record as an input; the interval may not go beyond it.
+def without(record: Record, offset: float) -> Record:
+    """Return a record whose values are smaller by an offset.
 
     Raises:
-        FileError: The end lies beyond the record.
+        DataError: Nothing is left at the onset.
     """
+    return Record(record.knots, record.values - offset)
+
+
+def of_record(
+    source: str, whole: Record, end: float | None, start: float = 0.0, offset: str | None = None
+) -> DecayInput:
+    """Return a record as an input; the interval may not go beyond it.
+
+    Args:
+        source: Of the record, for messages and the model file.
+        whole: The record.
+        end: Of the interval [s], counted from `start`; the end of the record if not given.
+        start: The onset within the record [s].
+        offset: A number to take away from the values, or "auto".
+
+    Raises:
+        FileError: The start or the end lies beyond the record.
+        RangeError: The offset is no number.
+        DataError: The record ends at no constant that could be taken away.
+    """
+    record = after(whole, start)
     last = float(record.knots[-1])
     if end is not None and end > last:
         raise FileError(f"{source}: the record ends at {last:g} s, before --end {end:g}")
     span = end or last
-    return DecayInput(source, record, span, last, int(np.count_nonzero(record.knots <= span)))
+    if offset is None:
+        return DecayInput(source, record, span, last, start)
+    if offset == "auto":
+        level = resting_level(record, span)
+        if level is None:
+            raise DataError(
+                f"{source}: ends at no constant other than 0; give --offset a number, or leave it"
+            )
+    else:
+        level = _number("--offset", offset)
+    return DecayInput(source, without(record, level), span, last, start, level)
+
+
+def _number(name: str, text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise RangeError(f"{name} must be a number or auto, got {text!r}")
+    return number

@@ -21,6 +21,8 @@ from limit_surface_ros.decay.coefficient_fits import NORMS
 from limit_surface_ros.decay.examples import EXAMPLES as RESPONSES
 from limit_surface_ros.decay.fit import METHODS, Options, fit_decay
 from limit_surface_ros.decay.response_fits import largest_error
+from limit_surface_ros.decay.smoothing import resting_level
+from limit_surface_ros.decay.targets import Record
 from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.decay_file import DecayModel, write_decay_model
 from limit_surface_ros.tools.decay_input import add_input_options, read_input
@@ -41,6 +43,10 @@ EXAMPLES = """methods:
   esprit    rates of the samples by ESPRIT, coefficients refitted
   polished  those of esprit, moved to make the largest error smaller
   best      the better of neutral and polished
+
+Records: a fit is made on the samples and its error measured there; only what the sum strays
+between samples beyond the record's own bends is counted too. Methods that need a function (the
+kernel of dde, the samples of esprit from a record that is not uniform) take straight lines.
 
 examples:
   fit_decay f1 --terms 9 --output hockey_stick.yaml
@@ -138,7 +144,22 @@ def doubts(result: DecayFit, given: DecayInput) -> list[str]:
             f"the error is {fit.max_error / onset:.3g} times the onset: "
             "too few terms, or no decaying response"
         )
+    level = None
+    if isinstance(given.target, Record):
+        level = resting_level(given.target, given.end)
+    if level is not None:
+        found.append(
+            f"the record ends at about {level:.3g}: is that an offset, such as a sensor's bias? "
+            "Then take it away with --offset auto; a load does not die away to it"
+        )
     return found
+
+
+def between(result: DecayFit, given: DecayInput) -> float | None:
+    """Return how far the sum is from straight lines between samples; None for an example."""
+    if not isinstance(given.target, Record):
+        return None
+    return largest_error(result.fit.sum, given.target.lines, 0.0, given.end)
 
 
 def report(result: DecayFit, given: DecayInput) -> None:
@@ -150,16 +171,24 @@ def report(result: DecayFit, given: DecayInput) -> None:
     )
     after = beyond(result, given)
     slowest = fit.sum.rates[int(np.argmax(fit.sum.rates.real))]
+    where = "" if given.samples is None else f"at the {given.samples} samples "
     rows = [
-        ("response", given.source),
+        ("response", given.source + (f" less {given.offset:.6g}" if given.offset else "")),
         ("method", choice.method + (f" ({chosen})" if chosen else "")),
         ("terms", f"{fit.sum.terms} real ({len(fit.sum.rates)} rates)"),
-        ("error", f"{fit.max_error:.4e} on [0, {given.end:g}] s"),
+        ("error", f"{fit.max_error:.4e} {where}on [0, {given.end:g}] s"),
     ]
+    lines = between(result, given)
+    if lines is not None:
+        rows.append(("between", f"up to {lines:.4e} from the straight lines between samples"))
     if np.isfinite(fit.lower_bound):
         gap = (fit.grid_error - fit.lower_bound) / max(fit.grid_error, 1e-300)
         rows.append(
-            ("optimal", f"{fit.norm}-norm {fit.grid_error:.4e}, within {max(gap, 0.0):.1e}")
+            (
+                "optimal",
+                f"{fit.norm}-norm {fit.grid_error:.4e} on the fit's grid; other coefficients "
+                f"would lower it by {max(gap, 0.0):.1e} of itself at most",
+            )
         )
     if after is not None:
         rows.append(("beyond", f"{after:.4e} on [{given.end:g}, {given.horizon:g}] s"))
@@ -182,11 +211,32 @@ def history(result: DecayFit, given: DecayInput) -> dict[str, Any]:
         "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
         "version": __version__,
     }
+    if given.start:
+        values["start"] = given.start
+    if given.offset:
+        values["offset"] = given.offset
     after = beyond(result, given)
     if after is not None:
         values["error_beyond"] = after
         values["beyond_until"] = given.horizon
     return values
+
+
+def model_of(result: DecayFit, given: DecayInput, name: str) -> DecayModel:
+    """Return the fit as a decay model.
+
+    Raises:
+        RangeError: The fitted sum does not decay.
+    """
+    return DecayModel(
+        name=name,
+        sum=result.fit.sum,
+        time_span=(0.0, given.end),
+        norm=result.fit.norm,
+        max_error=result.fit.max_error,
+        system=result.choice.system,
+        fit=history(result, given),
+    )
 
 
 def refuse_options_of_others(options: argparse.Namespace) -> None:
@@ -197,7 +247,7 @@ def refuse_options_of_others(options: argparse.Namespace) -> None:
     """
     top = parser()
     if options.input in RESPONSES:
-        refuse_unused(top, options, ["start"], "for a record")
+        refuse_unused(top, options, ["start", "offset"], "for a record")
     if not is_bag(Path(options.input)):
         refuse_unused(top, options, ["topic", "field"], "for a bag")
     if options.input in RESPONSES or is_bag(Path(options.input)):
@@ -215,6 +265,7 @@ def run(options: argparse.Namespace) -> None:
         if not options.output.parent.is_dir():
             raise RangeError(f"{options.output}: its folder does not exist")
     refuse_options_of_others(options)
+    chosen = method_options(options)
     given = read_input(options)
     given.require_samples_for(options.terms)
     result = fit_decay(
@@ -223,27 +274,19 @@ def run(options: argparse.Namespace) -> None:
         given.end,
         options.method,
         options.norm,
-        method_options(options),
+        chosen,
         show_progress,
     )
     end_progress()
+    # Before the report: a sum that is no decay model, and so not written, is told first.
+    model = None if options.output is None else model_of(result, given, name)
     report(result, given)
     for doubt in doubts(result, given):
         print(f"fit_decay: warning: {doubt}", file=sys.stderr)
-    if options.output is None:
-        return
-    model = DecayModel(
-        name=name,
-        sum=result.fit.sum,
-        time_span=(0.0, given.end),
-        norm=result.fit.norm,
-        max_error=result.fit.max_error,
-        system=result.choice.system,
-        fit=history(result, given),
-    )
-    command = shlex.join(["fit_decay", *options.command])
-    write_decay_model(model, options.output, header=f"Made by: {command}")
-    print(f"{'written':<11} {options.output}")
+    if model is not None:
+        command = shlex.join(["fit_decay", *options.command])
+        write_decay_model(model, options.output, header=f"Made by: {command}")
+        print(f"{'written':<11} {options.output}")
 
 
 def main(argv: Sequence[str] | None = None) -> int:

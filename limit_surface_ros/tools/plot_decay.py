@@ -14,6 +14,7 @@ from limit_surface_ros.files.decay_file import read_decay_model
 from limit_surface_ros.files.response_csv import read_response
 from limit_surface_ros.plots.canvas import DPI, SUFFIXES, save_figure
 from limit_surface_ros.plots.decay_view import PROJECTION, draw_decay
+from limit_surface_ros.tools.decay_input import after, without
 from limit_surface_ros.tools.program import run_program
 
 if TYPE_CHECKING:
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
 
 EPILOG = f"""\
 The projection goes {PROJECTION:g} times as far as the fit. The response is the one that the model
-file names as its source, if that is an example or a file that is still there.
+file names as its source, if that is an example or a file that is still there. A record
+is drawn from the start that the model file states, less the offset that it states.
 
 examples:
   plot_decay hockey_stick.yaml
@@ -72,13 +74,20 @@ def response_of(model: DecayModel, options: argparse.Namespace) -> Target | None
         return example(name)
     path = Path(name)
     if path.is_file():
-        return read_response(path, options.time_column, options.value_column)
+        record = read_response(path, options.time_column, options.value_column)
+        return without(after(record, _stated(model, "start")), _stated(model, "offset"))
     if options.response:
         raise FileError(
             f"{path}: no such file, and no example has that name; examples are "
             f"{', '.join(EXAMPLES)}"
         )
     return None
+
+
+def _stated(model: DecayModel, key: str) -> float:
+    """Return a number that the model file states of its fit, 0 if it states none."""
+    value = model.fit.get(key, 0.0)
+    return float(value) if isinstance(value, (int, float)) else 0.0
 
 
 def run(options: argparse.Namespace) -> None:

@@ -15,7 +15,7 @@ from limit_surface_ros.decay.rates_esprit import esprit
 from limit_surface_ros.decay.rates_neutral import neutral_rates, neutral_roots
 from limit_surface_ros.decay.response_fits import fit_response, largest_error
 from limit_surface_ros.decay.roots import first_roots
-from limit_surface_ros.decay.targets import PiecewiseLinear
+from limit_surface_ros.decay.targets import PiecewiseLinear, Record
 from limit_surface_ros.errors import LimitSurfaceError, RangeError, ShapeError, UnstableError
 
 END = 19.0
@@ -143,3 +143,22 @@ def test_a_response_that_nothing_suits_gives_a_fit_or_a_reason_but_no_warning(me
         result = fit_decay(almost_a_step, terms, 5.0, method)
         assert result.fit.max_error < 1.0
         assert result.fit.sum.slowest_rate < 0.0
+
+
+def test_rates_that_only_the_samples_of_a_record_agree_with_are_no_fit():
+    times = np.linspace(0.0, 4.0, 41)
+    record = Record(times, np.exp(-times))
+    # The samples cannot tell a frequency from the same less one turn a sample.
+    alias = fit_response(np.array([-1.0 + 2.0j * np.pi / 0.1]), record, 4.0)
+    true = fit_response(np.array([-1.0 + 0.0j]), record, 4.0)
+    assert true.max_error < 1e-14
+    assert alias.max_error > 0.3
+
+
+def test_records_whose_samples_are_not_uniform_are_met_at_them_too():
+    rng = np.random.default_rng(3)
+    times = np.append(0.0, np.sort(rng.uniform(0.0, 4.0, 150)))
+    record = Record(times, 2.0 * np.exp(-times) - np.exp(-3.0 * times))
+    result = fit_decay(record, 2, 4.0, "polished")
+    assert result.fit.max_error < 1e-9
+    np.testing.assert_allclose(np.sort(result.choice.rates.real), [-3.0, -1.0], rtol=1e-6)

@@ -21,6 +21,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from limit_surface_ros.files.contact_file import read_contact
+from limit_surface_ros.files.pushes_csv import read_pushes
+from limit_surface_ros.files.response_csv import read_response
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
 from limit_surface_ros.files.yaml_reader import write_atomically
 from limit_surface_ros.surface.point_contacts import PointContacts
@@ -171,6 +174,31 @@ def test_every_code_block_of_a_page_runs(page, own_files, environment):
         timeout=90,
     )
     assert run.returncode == 0, f"{run.stdout}\n{run.stderr}"
+
+
+FORMATS = [
+    (page, match[1], match[2])
+    for page in (ROOT / "README.md", ROOT / "docs" / "reference" / "files.md")
+    for match in re.finditer(r"```(yaml|text)\n(.*?)```", page.read_text("utf-8"), re.DOTALL)
+]
+
+
+@pytest.mark.parametrize(("page", "language", "text"), FORMATS)
+def test_every_file_that_is_shown_is_read(tmp_path, page, language, text):
+    path = tmp_path / "shown"
+    path.write_text(text)
+    if language == "yaml":
+        assert read_contact(path).name
+    elif "fx_N" in text:
+        assert len(read_pushes(path).pairs) == 2
+    else:
+        assert len(read_response(path).knots) == 2
+
+
+def test_both_descriptions_of_contacts_and_both_sorts_of_csv_are_shown():
+    shown = "".join(text for page, _, text in FORMATS if page.name == "files.md")
+    for key in ("friction_limits:", "shape:", "fx_N,", "t,force"):
+        assert key in shown
 
 
 def test_the_first_hour_ends_with_a_model_a_picture_and_answers(tmp_path, environment):

@@ -24,6 +24,12 @@ def test_support_points_are_read_about_their_centroid(tmp_path):
     assert model.surface.scaling.friction_force == 6.0
 
 
+def test_support_points_may_state_the_weight_at_which_their_limits_hold(tmp_path):
+    limits = POINTS + "friction_limits: [1, 2, 3]\n"
+    assert read(tmp_path, limits).normal_force is None
+    assert read(tmp_path, limits + "normal_force: 12.0\n").normal_force == 12.0
+
+
 def test_a_given_reference_point_is_kept(tmp_path):
     model = read(tmp_path, POINTS + "friction_limits: [1, 2, 3]\nreference_point: [0, 0.3]\n")
     np.testing.assert_allclose(model.surface.points[2], [0, 0])
@@ -65,6 +71,10 @@ def test_every_pressure_is_read(tmp_path, pressure):
         (POINTS, "friction_limits: missing"),
         (POINTS + "friction_limits: [1, 2]\n", "friction_limits: must be an array of 3"),
         (POINTS + "friction_limits: [0, 0, 0]\n", "friction_limits: .* above 0"),
+        (
+            POINTS + "friction_limits: [1, 1, 1]\nnormal_force: 0\n",
+            "normal_force: must be above 0",
+        ),
         (POINTS + "friction_limits: [1, 1, 1]\ncolour: red\n", "colour: is not known"),
         (PATCH + "shape: {kind: star}\n", r"shape.kind: must be one of polygon, .* bitmap"),
         (PATCH + "shape: {kind: disc, radius: -1}\n", "shape.radius: must be above 0"),

@@ -78,6 +78,20 @@ GOOD = {
 
 
 @pytest.mark.parametrize(
+    ("text", "program"),
+    [
+        ("kind: power_sum\ncharacteristic_length: 0.1\n", "plot_surface"),
+        ("points: [[0, 0]]\n", "fit_surface"),
+    ],
+)
+def test_files_of_limit_surfaces_are_sent_to_the_right_program(tmp_path, text, program):
+    path = tmp_path / "other.yaml"
+    path.write_text(f"schema: 1\nname: m\n{text}")
+    with pytest.raises(FileError, match=rf"kind: .*{program}.*of kind exponential_sum"):
+        read_decay_model(path)
+
+
+@pytest.mark.parametrize(
     ("key", "value", "message"),
     [
         ("schema", "2", "schema: must be one of 1"),

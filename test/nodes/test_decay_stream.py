@@ -105,6 +105,22 @@ def test_an_onset_in_the_future_waits(ros, bench):
     check_against_the_library(bench, START + 50 * STEP)
 
 
+@pytest.mark.parametrize(
+    ("stamp", "what"),
+    [
+        (START + 5 * SECOND, "onset in the future"),
+        (START + SECOND // 2, None),
+        (START - SECOND // 2, None),
+        (START - 90 * SECOND, "onset over"),
+    ],
+)
+def test_an_onset_that_is_far_from_now_is_taken_and_told_of(ros, bench, stamp, what):
+    bench.onset(stamp)
+    ros.wait(lambda: bench.forecasts)
+    assert bench.node.health.reported == ({what: 1} if what else {})
+    assert not bench.node.health.refused
+
+
 def test_an_onset_in_the_past_starts_in_the_middle(ros, bench):
     past = START - 30 * STEP - STEP // 3
     bench.onset(past)

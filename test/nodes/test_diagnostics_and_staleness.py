@@ -176,6 +176,19 @@ def test_a_subscriber_that_gets_nothing_is_told_of_until_it_goes(
     assert seen.status.level == DiagnosticStatus.OK
 
 
+def test_a_second_node_of_the_same_name_is_told_of(stranger, watch):
+    seen = watch()
+    seen.wait(lambda: seen.values.get("namesakes") == "0")
+    other = rclpy.create_node("limit_surface", context=stranger.context)
+    try:
+        seen.wait(lambda: seen.values.get("namesakes") == "1")
+        assert seen.status.level == DiagnosticStatus.WARN
+        assert "1 other node(s) named /limit_surface" in seen.status.message
+    finally:
+        other.destroy_node()
+    seen.wait(lambda: seen.status.level == DiagnosticStatus.OK)
+
+
 def test_a_publisher_that_is_not_heard_is_told_of(stranger, watch):
     seen = watch()
     stranger.create_publisher(Vector3Stamped, "/limit_surface/twist", 1)

@@ -13,6 +13,8 @@ pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not b
 
 from limit_surface_interfaces.srv import WrenchToTwist
 
+from limit_surface_ros.nodes import decay_node, surface_node
+from limit_surface_ros.nodes.model_node import COMMON_SETTINGS
 from node_helpers import Program, planar_twist, wrench_message
 
 
@@ -53,6 +55,7 @@ def test_another_process_is_served_until_a_signal_ends_it_cleanly(
         ("input_timeout:=.nan", "input_timeout"),
         ("normal_force_from:=moon", "normal_force_from"),
         ("static_transforms:=['a b 1 2']", "static_transforms"),
+        ("normal_force:=5", "normal_force must have a decimal point: write 5.0"),
         ("out_of_plane_tolerance:=text", "out_of_plane_tolerance"),
     ],
 )
@@ -72,7 +75,8 @@ def test_a_misspelt_parameter_is_told_with_the_one_that_was_meant(ros, client_no
         ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
         _, output = program.end()
     assert "'model_file' is not known here and is ignored; did you mean 'model_files'?" in output
-    assert "'weather' is not known here" in output
+    (line,) = (line for line in output.splitlines() if "'weather' is not known here" in line)
+    assert "[WARN]" in line
     assert output.count("not known here") == 2
 
 
@@ -108,3 +112,39 @@ def test_help_teaches_how_to_give_parameters():
         code, output = program.ended()
     assert code == 0
     assert "--params-file" in output
+
+
+@pytest.mark.parametrize(
+    ("program", "tables"),
+    [
+        ("limit_surface_node", [surface_node.SETTINGS]),
+        ("decay_node", [decay_node.SETTINGS]),
+        ("force_motion_nodes", [surface_node.SETTINGS, decay_node.SETTINGS]),
+    ],
+)
+def test_help_lists_every_parameter_with_default_and_meaning(program, tables):
+    with Program(program, "--help") as running:
+        code, output = running.ended()
+    assert code == 0
+    assert "-p \"model_files:=['/path/to/model.yaml']\"" in output
+    told = " ".join(output.split())
+    for table in tables:
+        for setting in (*table, *COMMON_SETTINGS):
+            assert f"{setting.name} := {setting.written} {setting.description}" in told
+
+
+def test_a_model_file_without_its_parameter_is_told_how_to_be_given():
+    with Program("limit_surface_node", "model.yaml") as program:
+        code, output = program.ended()
+    assert code == 2
+    assert "-p \"model_files:=['model.yaml']\"" in output
+
+
+def test_a_file_that_both_nodes_of_a_process_were_given_is_told_how_to_give_to_one(model_file):
+    _, path = model_file()
+    files = f"model_files:=['{path}']"
+    with Program("force_motion_nodes", "--ros-args", "-p", files) as program:
+        code, output = program.ended()
+    assert code == 1
+    assert "this is a limit surface, which the limit_surface node serves" in output
+    assert "-p limit_surface:model_files:=" in output

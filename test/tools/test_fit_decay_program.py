@@ -8,6 +8,7 @@ import pytest
 
 from limit_surface_ros.decay import examples
 from limit_surface_ros.files.decay_file import read_decay_model
+from limit_surface_ros.files.response_csv import read_response
 from limit_surface_ros.tools import compare_decays, fit_decay
 
 
@@ -45,6 +46,21 @@ def test_the_delay_system_is_written_with_its_model(tmp_path):
     assert np.abs(value / slope).max() < 1e-10
 
 
+def test_a_record_that_is_a_sum_of_exponentials_is_fitted_exactly_at_its_samples(tmp_path, capsys):
+    record, times = tmp_path / "record.csv", np.linspace(0.0, 4.0, 201)
+    values = 6.0 * np.exp(-1.5 * times) + 2.0 * np.exp(-4.0 * times) * np.cos(9.0 * times)
+    record.write_text("\n".join(f"{t},{x}" for t, x in zip(times, values, strict=True)))
+    output = tmp_path / "model.yaml"
+    arguments = [str(record), "-n", "3", "--method", "esprit", "-o", str(output)]
+    assert fit_decay.main(arguments) == 0
+    model = read_decay_model(output)
+    assert model.max_error < 1e-11
+    np.testing.assert_allclose(model.sum.rates, [-1.5, -4.0 + 9.0j], rtol=1e-9)
+    printed = capsys.readouterr().out
+    assert "at the 201 samples on [0, 4] s" in printed
+    assert re.search(r"^between +up to 4\.9\d*e-03 from the straight lines", printed, re.MULTILINE)
+
+
 @pytest.mark.parametrize("header", ["time,force", ""])
 def test_a_record_gives_back_its_rate_from_its_own_onset(tmp_path, header):
     record = write_record(tmp_path / "record.csv", header=header)
@@ -70,8 +86,8 @@ def test_a_column_is_chosen_by_its_name(tmp_path):
 @pytest.mark.parametrize(
     ("text", "extra", "message"),
     [
-        ("t,x\n0,1\n1,oops\n", [], "line 3: 'oops' is not a finite number"),
-        ("t,x\n0,1\n1,nan\n", [], "line 3: 'nan' is not a finite number"),
+        ("t,x\n0,1\n1,oops\n", [], "line 3: 'oops' is no finite number\n"),
+        ("t,x\n0,1\n1,nan\n", [], "line 3: 'nan' is no finite number\n"),
         ("t,x\n0,1\n", [], "holds 1 samples"),
         ("", [], "holds no rows"),
         ("t,x\n0,0\n1,1\n", [], "x(0) must not be zero"),
@@ -80,6 +96,11 @@ def test_a_column_is_chosen_by_its_name(tmp_path):
         ("t,x\n0,1\n1,0.5\n", ["--end", "5"], "ends at 1 s"),
         ("t,x\n0,1\n1,0.5\n", ["--end", "-5"], "--end"),
         ("t\n0\n1\n", [], "has no column 2"),
+        ("0;1\n1;0.5\n", [], "cells are separated by commas"),
+        ("t;x\n0,0;1,0\n1,0;0,5\n", [], "line 2: '0;1' is no finite number; cells are separated"),
+        ("t,x\n0,1\n1,1e300\n", [], "line 3: 1e300 is beyond 1e+100"),
+        ("t,x\n0,1e-300\n1,1e-301\n", [], "values must be between 1e-100 and 1e+100"),
+        ("t [h],x\n0,1\n1,0.5\n", [], "times are in 'h' by the column's name 't [h]'"),
         ("t,x\n0,1\n1," + "1" * 200_000, [], "line 3: is not a row of CSV: field larger"),
     ],
 )
@@ -90,6 +111,33 @@ def test_a_bad_record_gives_one_line_and_no_file(tmp_path, capsys, text, extra, 
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1
+    assert not output.exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"), [("t [ms]", 1e-3), ("t (us)", 1e-6), ("stamp_ns", 1e-9), ("t_s", 1.0)]
+)
+def test_times_are_read_in_the_unit_that_their_column_states(tmp_path, name, unit):
+    record = tmp_path / "record.csv"
+    rows = [f"{t / unit},{np.exp(-t)}" for t in np.linspace(0.0, 4.0, 41)]
+    record.write_text("\n".join([f"{name},x", *rows]))
+    assert read_response(record).knots[-1] == pytest.approx(4.0)
+
+
+def test_yaml_is_no_record(tmp_path, capsys):
+    contact = tmp_path / "contact.yaml"
+    contact.write_text("name: el\n")
+    assert fit_decay.main([str(contact), "-n", "1"]) == 2
+    assert "accepted are an example, a CSV file" in capsys.readouterr().err
+
+
+def test_a_sum_that_is_no_decay_model_is_told_before_the_report(tmp_path, capsys):
+    output = tmp_path / "f4.yaml"
+    chosen = ["--method", "dde", "--max-delay", "6", "--allow-unstable"]
+    assert fit_decay.main(["f4", "-n", "5", *chosen, "-o", str(output)]) == 2
+    told = capsys.readouterr()
+    assert "must decay" in told.err
+    assert told.out == ""
     assert not output.exists()
 
 
@@ -113,14 +161,69 @@ def test_a_response_that_does_not_decay_is_warned_of(tmp_path, capsys, growth, w
     assert ("warning: the fitted sum does not decay" in capsys.readouterr().err) == warned
 
 
+def write_offset(path, offset, noise=0.0):
+    times = np.linspace(0.0, 4.0, 201)
+    noisy = noise * np.random.default_rng(1).normal(size=201)
+    values = 5.0 * np.exp(-2.0 * times) + offset + noisy
+    path.write_text("\n".join(f"{t},{x}" for t, x in zip(times, values, strict=True)))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("offset", "noise", "warned"),
+    [
+        (1.0, 0.0, True),
+        (-0.4, 0.0, True),
+        (1.0, 0.05, True),
+        (0.0, 0.0, False),
+        (0.0, 0.05, False),
+    ],
+)
+def test_a_record_that_ends_at_a_constant_is_warned_of(tmp_path, capsys, offset, noise, warned):
+    record = write_offset(tmp_path / "record.csv", offset, noise)
+    assert fit_decay.main([str(record), "-n", "2", "--method", "esprit"]) == 0
+    told = capsys.readouterr().err
+    assert ("the record ends at about" in told) == warned
+    assert ("--offset auto" in told) == warned
+
+
+@pytest.mark.parametrize(("given", "expected"), [("auto", 1.0025), ("1.0", 1.0)])
+def test_an_offset_is_taken_away_and_kept_with_the_model(tmp_path, given, expected):
+    record, output = write_offset(tmp_path / "record.csv", 1.0), tmp_path / "model.yaml"
+    arguments = [str(record), "-n", "1", "--method", "esprit", "--offset", given]
+    assert fit_decay.main([*arguments, "--start", "0.2", "-o", str(output)]) == 0
+    model = read_decay_model(output)
+    np.testing.assert_allclose(model.sum.rates, [-2.0], rtol=0.01)
+    assert model.fit["offset"] == pytest.approx(expected, abs=1e-3)
+    assert model.fit["start"] == 0.2
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("auto", "ends at no constant other than 0"),
+        ("x", "--offset must be a number or auto, got 'x'"),
+        ("nan", "--offset must be a number or auto"),
+    ],
+)
+def test_an_offset_that_cannot_be_taken_away_is_refused(tmp_path, capsys, given, message):
+    record = write_offset(tmp_path / "record.csv", 0.0)
+    assert fit_decay.main([str(record), "-n", "1", "--offset", given]) == 2
+    assert message in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (["f1", "-n", "5", "--offset", "1"], "--offset does nothing here: it is for a record"),
         (["nowhere.csv", "-n", "3"], "no such file, and no example has that name"),
         (["f1", "-n", "0"], "terms must be at least 1"),
         (["f4", "-n", "5", "--method", "dde"], "not minimum-phase"),
         (["f1", "-n", "5", "-o", "no/such/folder/f.yaml"], "folder does not exist"),
         (["f1", "-n", "5", "--method", "dde", "--max-delay", "-1"], "max_delay"),
+        (["f1", "-n", "5", "--method", "dde", "--max-delay", "1", "--degree", "99"], "0 to 30"),
+        (["f1", "-n", "5", "--tail-rate", "1"], "must have a real part below 0"),
+        (["f1", "-n", "5", "--tail-rate=-1-2j"], "Im >= 0"),
         (["f1", "-n", "5", "--topic", "/wrench"], "--topic does nothing here: it is for a bag"),
         (["f1", "-n", "5", "--value-column", "x"], "it is for a CSV file"),
         (["f1", "-n", "5", "--max-delay", "3"], "it is for --method dde"),
@@ -143,6 +246,20 @@ def test_methods_and_terms_are_compared_in_one_table(capsys):
     assert "dde: the response is not minimum-phase" in printed
     errors = {(row[0], row[1]): float(row[2]) for row in rows[2:] if row[2] != "refused"}
     assert errors["| esprit", "7"] < errors["| esprit", "5"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["f1", "--terms", "5", "0"], "--terms must be at least 1 each, got 0"),
+        (["f1", "--tail-rate", "1"], "must have a real part below 0"),
+    ],
+)
+def test_a_comparison_of_nothing_that_could_be_fitted_is_refused(capsys, arguments, message):
+    assert compare_decays.main(arguments) == 2
+    told = capsys.readouterr()
+    assert message in told.err
+    assert told.out == ""
 
 
 def write_bag(folder, storage="SQLITE3", count=201):
@@ -214,7 +331,21 @@ def test_a_bag_that_does_not_hold_what_is_asked_says_what_it_holds(
 def test_a_folder_that_is_no_bag_is_refused(tmp_path, capsys):
     pytest.importorskip("rosbags")
     assert fit_decay.main([str(tmp_path), "--topic", "/x", "-n", "1"]) == 2
-    assert "cannot be read as a bag" in capsys.readouterr().err
+    assert "the folder has no metadata.yaml; accepted are the folder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["bad.mcap", "bad.db3", "bad/metadata.yaml"])
+def test_a_bag_that_is_broken_is_refused_in_one_line(tmp_path, capsys, name):
+    pytest.importorskip("rosbags")
+    file = tmp_path / name
+    file.parent.mkdir(exist_ok=True)
+    file.write_text("x: [")
+    bag = file.parent if file.name == "metadata.yaml" else file
+    assert fit_decay.main([str(bag), "--topic", "/x", "-n", "1"]) == 2
+    told = capsys.readouterr().err
+    assert "cannot be read as a bag" in told
+    assert told.endswith("accepted are the folder of a ROS 2 bag, or an .mcap or .db3 file\n")
+    assert told.count("\n") == 1
 
 
 @pytest.mark.parametrize("program", [fit_decay, compare_decays])

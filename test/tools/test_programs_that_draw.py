@@ -73,6 +73,21 @@ def test_a_decay_is_drawn_with_error_rates_and_projection(decay_file):
     assert above.get_xlabel() == "t [s]"
 
 
+def test_a_record_is_drawn_as_the_fit_saw_it(tmp_path):
+    record, output = tmp_path / "record.csv", tmp_path / "model.yaml"
+    times = np.linspace(0.0, 3.0, 61)
+    record.write_text("\n".join(f"{t},{3.0 * np.exp(-2.0 * t) + 1.0}" for t in times))
+    chosen = ["--start", "0.5", "--offset", "1"]
+    assert fit_decay.main([str(record), "-n", "1", *chosen, "-o", str(output)]) == 0
+    model = read_decay_model(output)
+    target = plot_decay.response_of(model, plot_decay.parser().parse_args([str(output)]))
+    above, _, below, _ = draw_decay(model, target).axes
+    samples, error = above.get_lines()[0], below.get_lines()[0]
+    assert samples.get_label() == "samples"
+    assert samples.get_ydata()[0] == pytest.approx(3.0 * np.exp(-1.0))
+    assert np.abs(error.get_ydata()).max() <= 1.001 * model.max_error + 1e-12
+
+
 def test_without_a_response_only_the_model_is_drawn(decay_file):
     above, _, below, _ = draw_decay(read_decay_model(decay_file)).axes
     assert [line.get_label() for line in above.get_lines()] == ["model"]

@@ -217,7 +217,7 @@ def noisy_claims(body: str, noisy: Errors, clean: Errors) -> tuple[Claim, ...]:
             Claim(
                 "With noise J1 and J2 do equally well in motion, where J2 was better without.",
                 "Median of J2 over that of J1 with 2, 3, 4 terms: "
-                f"{_numbers(ratios)}; without noise {_numbers(clean_ratios)}.",
+                f"{_as_text(ratios)}; without noise {_as_text(clean_ratios)}.",
                 all(0.8 < ratio < 1.25 for ratio in ratios) and max(clean_ratios) < 0.8,
             )
         )
@@ -286,12 +286,12 @@ def _common_claims(body: str, errors: Errors) -> tuple[Claim, ...]:
         ),
         Claim(
             "With more terms J2 gets better, until all errors of motion are below 0.3.",
-            f"Medians with 1 to 4 terms {_numbers(falling)}; largest {_numbers(largest)}.",
+            f"Medians with 1 to 4 terms {_as_text(falling)}; largest {_as_text(largest)}.",
             falling == sorted(falling, reverse=True) and min(largest) < 0.3,
         ),
         Claim(
             "In load, J2 with more terms does about as well as J1 with two.",
-            f"Medians of J2 with 2, 3, 4 terms over that of J1 with two: {_numbers(ratios)}.",
+            f"Medians of J2 with 2, 3, 4 terms over that of J1 with two: {_as_text(ratios)}.",
             all(0.75 < ratio < 1.33 for ratio in ratios),
         ),
     )
@@ -321,10 +321,10 @@ def _medians(errors: Mapping[Fit, Floats]) -> dict[Fit, float]:
 
 
 def _row(medians: Mapping[Fit, float], body: str, families: Sequence[str], objective: str) -> str:
-    return _numbers([medians[Fit(body, family, objective)] for family in families])
+    return _as_text([medians[Fit(body, family, objective)] for family in families])
 
 
-def _numbers(values: Sequence[float]) -> str:
+def _as_text(values: Sequence[float]) -> str:
     return ", ".join(f"{value:.3f}" for value in values)
 
 
