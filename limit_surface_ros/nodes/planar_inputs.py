@@ -180,8 +180,8 @@ class PlanarInputs:
         force = self._parameters["normal_force"] if source == "parameter" else pressed
         if model.normal_force is None:
             raise RangeError(
-                f"model {model.name!r} states no normal_force, so it cannot be scaled; set "
-                "normal_force_from to model"
+                f"model {model.name!r} states no normal_force, so it cannot be scaled; state "
+                "it in the model's file, or set normal_force_from to model"
             )
         if not force > 0.0:
             raise RangeError(

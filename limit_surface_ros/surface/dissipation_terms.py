@@ -130,7 +130,8 @@ class PointTerms:
             velocities /= self._speeds(velocities[0], velocities[1], twists)
             pulls = self._pulls[:, :, part].reshape(3, -1)
             loads.append(pulls @ velocities.reshape(-1, columns))
-        return sum(loads[1:], start=loads[0])
+        total: Floats = sum(loads[1:], start=loads[0])
+        return total
 
     def values(self, twists: Floats) -> Floats:
         """Return D (m,)."""

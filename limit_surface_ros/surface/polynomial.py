@@ -202,10 +202,9 @@ def _first_derivatives(second: Floats) -> Floats:
     """Return C (3, 10) with the gradient C q for the cubic monomials q of `_CUBICS`."""
     first: Floats = np.zeros((3, 10))
     places = {powers: place for place, powers in enumerate(_CUBICS)}
-    for place, powers in enumerate(_QUADRATICS):
-        for j in range(3):
-            raised = tuple(power + (axis == j) for axis, power in enumerate(powers))
-            # Of a homogeneous cubic, the gradient's component is x . (its gradient) / 3.
+    for place, (x, y, m) in enumerate(_QUADRATICS):
+        # A homogeneous cubic, as each component of the gradient, is f . (its gradient) / 3.
+        for j, raised in enumerate([(x + 1, y, m), (x, y + 1, m), (x, y, m + 1)]):
             first[:, places[raised]] += second[:, j, place] / 3.0
     return first
 

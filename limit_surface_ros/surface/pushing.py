@@ -128,7 +128,7 @@ def push(
         RangeError: The coefficient is negative or not finite.
     """
     contact = _Contact(surface, point, normal, friction)
-    pushed = _numbers("velocity", velocity)
+    pushed = _pair("velocity", velocity)
     approach = _product(pushed, contact.normal)
     if approach <= 0.0:
         return Push(np.zeros(3), ContactMode.SEPARATE, np.zeros(3))
@@ -163,8 +163,8 @@ class _Contact:
         self, surface: LimitSurface, point: ArrayLike, normal: ArrayLike, friction: float
     ) -> None:
         self._surface = surface
-        self._x, self._y = _numbers("point", point)
-        nx, ny = _numbers("normal", normal)
+        self._x, self._y = _pair("point", point)
+        nx, ny = _pair("normal", normal)
         if not (nx or ny):
             raise ZeroVectorError("normal must not be zero: it has no direction")
         if not 0.0 <= friction < float("inf"):
@@ -288,7 +288,7 @@ def _product(a: tuple[float, float], b: tuple[float, float]) -> float:
     return a[0] * b[0] + a[1] * b[1]
 
 
-def _numbers(name: str, values: ArrayLike) -> tuple[float, float]:
+def _pair(name: str, values: ArrayLike) -> tuple[float, float]:
     pair = as_floats(name, values)
     if pair.shape != (2,):
         raise ShapeError(f"{name} must have shape (2,), got {pair.shape}")
