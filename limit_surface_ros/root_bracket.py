@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-# Every so many steps the bracket is halved, whatever the secant says.
-_HALVING = 4
+# Every so many steps the bracket is halved if the values did not fall much meanwhile.
+_LOOK = 4
+_MUCH = 0.5
 
 
 def root_bracket(
@@ -30,10 +31,9 @@ def root_bracket(
         Both ends; the same place twice if a value there counts as 0.
     """
     below, above = function(low), function(high)
-    step, side = 0, 0.0
+    step, side, before, slow = 0, 0.0, float("inf"), False
     while high - low > width:
-        step += 1
-        secant = step % _HALVING and below < 0.0 < above
+        secant = not slow and below < 0.0 < above
         place = low + (below / (below - above) if secant else 0.5) * (high - low)
         if not low < place < high:
             place = 0.5 * (low + high)
@@ -50,4 +50,8 @@ def root_bracket(
             below *= 0.5 if side > 0.0 else 1.0
             high, above = place, value
         side = value
+        step += 1
+        slow = False
+        if step % _LOOK == 0:
+            slow, before = abs(value) > _MUCH * before, abs(value)
     return low, high

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _WIDTH = 1e-13
 # Error of the velocity's direction at the contact [rad], or of the moment about it in parts of the
 # moment scale, that counts as none.
-_EXACT = 1e-12
+_EXACT = 1e-10
 # Sine between two velocities below which they count as one direction.
 _PARALLEL = 1e-12
 # A body that turns freely about its contact needs no turning rate, however large.
