@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     Bools: TypeAlias = NDArray[np.bool_]
     Places: TypeAlias = NDArray[np.intp]
 
+# Components beyond these are no loads or motions of this world, and products of them overflow.
+LARGEST = 1.0e100
+SMALLEST = 1.0e-100
 _REAL = (float, int)
 _INFINITY = float("inf")
 
