@@ -135,7 +135,7 @@ class Workbench:
             DataError: They cannot determine a surface.
         """
         scaled = scale_pairs(self.pairs, self.scaling)
-        check_support(scaled, FEWEST_PAIRS)
+        check_pushes(scaled, FEWEST_PAIRS)
         return scaled if self.weights is None else scaled.weighted(self.weights)
 
     def fit(self, recipe: Recipe) -> tuple[LimitSurface, Descent]:
@@ -197,6 +197,20 @@ class Workbench:
                 pairs, recipe.terms, weight, _ROBUST_SCALE, _FLOOR
             )
         return PowerSumObjective(pairs, np.full(recipe.terms, 0.5), weight, _ROBUST_SCALE)
+
+
+def check_pushes(pairs: ScaledPairs, fewest: int) -> None:
+    """Refuse pushes that say nothing, whatever a fit is held towards.
+
+    Raises:
+        DataError: They are fewer than `fewest`, or see `check_support`.
+    """
+    if len(pairs) < fewest:
+        raise DataError(
+            f"{len(pairs)} pushes are too few, even for a fit that is held towards a simpler "
+            f"one: at least {fewest} are needed"
+        )
+    check_support(pairs, 0)
 
 
 def _ellipsoid_pairs(pairs: ScaledPairs, weight: float, strength: float) -> ScaledPairs:
