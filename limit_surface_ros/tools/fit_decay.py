@@ -21,10 +21,10 @@ from limit_surface_ros.decay.coefficient_fits import NORMS
 from limit_surface_ros.decay.examples import EXAMPLES as RESPONSES
 from limit_surface_ros.decay.fit import METHODS, Options, fit_decay
 from limit_surface_ros.decay.response_fits import largest_error
-from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.decay_file import DecayModel, write_decay_model
 from limit_surface_ros.tools.decay_input import add_input_options, read_input
-from limit_surface_ros.tools.given_options import model_name, refuse_unused
+from limit_surface_ros.tools.given_options import refuse_empty, refuse_unused
+from limit_surface_ros.tools.output_file import MODEL_SUFFIXES, check_output
 from limit_surface_ros.tools.program import run_program
 from limit_surface_ros.tools.training_data import is_bag
 
@@ -211,9 +211,8 @@ def refuse_options_of_others(options: argparse.Namespace) -> None:
 def run(options: argparse.Namespace) -> None:
     """Read, fit, write, report."""
     if options.output is not None:
-        name = model_name(options.output, options.name)
-        if not options.output.parent.is_dir():
-            raise RangeError(f"{options.output}: its folder does not exist")
+        check_output(options.output, MODEL_SUFFIXES, [Path(options.input)])
+    refuse_empty(options, ["name"])
     refuse_options_of_others(options)
     given = read_input(options)
     given.require_samples_for(options.terms)
@@ -233,7 +232,7 @@ def run(options: argparse.Namespace) -> None:
     if options.output is None:
         return
     model = DecayModel(
-        name=name,
+        name=options.name or options.output.stem,
         sum=result.fit.sum,
         time_span=(0.0, given.end),
         norm=result.fit.norm,

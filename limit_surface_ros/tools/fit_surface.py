@@ -15,16 +15,19 @@ from limit_surface_ros.files.bag_pushes import Selection
 from limit_surface_ros.files.surface_file import write_surface_model
 from limit_surface_ros.fitting.multi_start import process_pool
 from limit_surface_ros.fitting.worker_processes import available_cores
-from limit_surface_ros.tools.given_options import model_name, refuse_unused
+from limit_surface_ros.tools.given_options import named_path, refuse_empty, refuse_unused
+from limit_surface_ros.tools.output_file import MODEL_SUFFIXES, check_output
 from limit_surface_ros.tools.program import run_program
 from limit_surface_ros.tools.progress import progress_bar
 from limit_surface_ros.tools.surface_fit import (
     WITHOUT_MOTIONS,
     add_fit_options,
+    add_frame_option,
+    check_fit_options,
     fit_model,
     objective_of,
 )
-from limit_surface_ros.tools.training_data import ACCEPTED, is_bag
+from limit_surface_ros.tools.training_data import ACCEPTED, CONTACT_SUFFIXES, check_input, is_bag
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -53,11 +56,14 @@ def parser() -> argparse.ArgumentParser:
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    top.add_argument("input", type=Path, help=ACCEPTED)
+    top.add_argument("input", type=named_path, help=ACCEPTED)
     top.add_argument(
         "-o", "--output", type=Path, required=True, help="model file to write (.yaml)"
     )
-    top.add_argument("--name", help="the model's name; default: that of the output file")
+    top.add_argument(
+        "--name", help="the model's name; default: the contact's, or that of the output file"
+    )
+    add_frame_option(top)
     top.add_argument(
         "--workers",
         type=int,
@@ -98,10 +104,11 @@ def refuse_options_of_others(options: argparse.Namespace) -> None:
     """Refuse what is for another kind of input or of fit than the one asked for.
 
     Raises:
+        FileError: There is no such input.
         RangeError: An option would do nothing.
     """
-    top, suffix = parser(), options.input.suffix.lower()
-    if suffix not in (".yaml", ".yml"):
+    top, suffix = parser(), check_input(options.input)
+    if suffix not in CONTACT_SUFFIXES:
         refuse_unused(top, options, OF_CONTACTS, "for a contact file")
     if suffix != ".csv":
         refuse_unused(top, options, ["rows"], "for a CSV of pushes")
@@ -115,18 +122,25 @@ def refuse_options_of_others(options: argparse.Namespace) -> None:
             refuse_unused(top, options, ["family"], "for --kind power_sum")
         if options.kind == "polynomial":
             refuse_unused(top, options, ["terms"], "not for --kind polynomial")
-        objective = objective_of(options, recorded=suffix not in (".yaml", ".yml"))
+        objective = objective_of(options, recorded=suffix not in CONTACT_SUFFIXES)
+        if objective == "second":
+            of_others = "not for --objective second, which has two terms of its own"
+            refuse_unused(top, options, ["terms", "family"], of_others)
         if objective in WITHOUT_MOTIONS:
             refuse_unused(top, options, ["velocity_weight"], f"not for the objective {objective}")
 
 
 def run(options: argparse.Namespace) -> None:
     """Read, fit, write, report."""
-    name = model_name(options.output, options.name)
+    check_output(options.output, MODEL_SUFFIXES, [options.input])
+    refuse_empty(options, ["name", "frame_id"])
+    check_fit_options(options)
     refuse_options_of_others(options)
     parts = "fits" if options.auto else "starts"
     with process_pool(options.workers) as executor, progress_bar(parts) as progress:
-        fitted = fit_model(options.input, name, options, executor, progress)
+        fitted = fit_model(
+            options.input, options.name, options, options.output.stem, executor, progress
+        )
     command = shlex.join(["fit_surface", *options.command])
     write_surface_model(fitted.model, options.output, header=f"Made by: {command}")
     report(fitted, options.output)
