@@ -26,6 +26,11 @@ _REAL = (float, int)
 _INFINITY = float("inf")
 
 
+def counted(count: int, noun: str) -> str:
+    """Return a count with its noun, "1 pair" or "2 pairs", for messages."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def as_floats(name: str, values: ArrayLike) -> Floats:
     """Return `values` as a finite float64 array of any shape.
 

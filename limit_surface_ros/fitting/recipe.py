@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from limit_surface_ros.checks import counted
 from limit_surface_ros.errors import DataError, RangeError, SolverError
 from limit_surface_ros.fitting.combined_objectives import HeldObjective
 from limit_surface_ros.fitting.dissipation_direction_objective import (
@@ -98,7 +99,7 @@ class Recipe:
         """Return the recipe in words."""
         words: list[str] = [self.kind if self.kind == "dissipation" else "power_sum (norms)"]
         if self.towards != "support":
-            words.append(f"{self.terms} terms")
+            words.append(counted(self.terms, "term"))
         words.append(f"velocity weight {self.velocity_weight:g}")
         if self.towards != "nothing":
             words.append(f"towards {self.towards} {self.strength:g}")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limit_surface_ros.checks import counted
 from limit_surface_ros.errors import DataError
 from limit_surface_ros.surface.scaling import Scaling
 
@@ -143,10 +144,9 @@ def check_support(pairs: ScaledPairs, parameters: int) -> None:
     """
     count = len(pairs)
     if count < max(parameters, 1):
-        pairs_there = "1 pair" if count == 1 else f"{count} pairs"
         raise DataError(
-            f"{pairs_there} cannot determine {parameters} parameters: give more pairs, fewer "
-            "terms, or choose the fit that is held towards a simpler one (--auto)"
+            f"{counted(count, 'pair')} cannot determine {parameters} parameters: give more "
+            "pairs, fewer terms, or choose the fit that is held towards a simpler one (--auto)"
         )
     against = int(np.count_nonzero(np.sum(pairs.wrenches * pairs.directions, axis=1) < 0.0))
     if against > count / 2:

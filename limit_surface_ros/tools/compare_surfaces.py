@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from limit_surface_ros.checks import counted
 from limit_surface_ros.errors import DataError, LimitSurfaceError, RangeError
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.fitting.bootstrap import surfaces_of, twist_spread
@@ -28,7 +29,11 @@ from limit_surface_ros.fitting.scaled_pairs import scaling_of_pairs
 from limit_surface_ros.fitting.worker_processes import available_cores
 from limit_surface_ros.plots.canvas import SUFFIXES, new_figure, save_figure
 from limit_surface_ros.plots.distributions import draw_distributions
+from limit_surface_ros.surface.dissipation import Dissipation
 from limit_surface_ros.surface.measures import load_error, quantiles, velocity_error
+from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.polynomial import Polynomial
+from limit_surface_ros.surface.power_sum import PowerSum
 from limit_surface_ros.tools.given_options import named_path
 from limit_surface_ros.tools.output_file import check_output
 from limit_surface_ros.tools.program import run_program
@@ -136,12 +141,14 @@ def options_of(options: argparse.Namespace, wanted: str) -> argparse.Namespace:
 
 
 def size_of(surface: LimitSurface) -> int:
-    """Return how many numbers define a surface: six for each symmetric matrix."""
-    if hasattr(surface, "matrices"):
-        return 6 * len(surface.matrices)
-    if hasattr(surface, "coefficients"):
-        return int(np.size(surface.coefficients))
-    return int(np.size(getattr(surface, "points", 0)) * 3 // 2)
+    """Return how many numbers define a surface of a kind that model files hold."""
+    if isinstance(surface, (PowerSum, Dissipation)):
+        return 6 * len(surface.matrices)  # a symmetric matrix each
+    if isinstance(surface, Polynomial):
+        return len(surface.coefficients)
+    if isinstance(surface, PointContacts):
+        return 3 * len(surface.points)  # x, y and friction limit each
+    raise TypeError(f"no size is known of a {surface.kind}")
 
 
 def microseconds_each(function: Callable[[Floats], Floats], vectors: Floats) -> float:
@@ -239,7 +246,7 @@ def run(options: argparse.Namespace) -> None:
     if not surfaces:
         raise DataError(f"nothing to compare is left: {'; '.join(refusals)}")
     kept = "held out" if data.held_out is not None else "fitted"
-    print(f"{options.data}: {len(test)} pairs, {kept}")
+    print(f"{options.data}: {counted(len(test), 'pair')}, {kept}")
     print_table([row_of(each, test) for each in surfaces])
     for refusal in refusals:
         print(f"left out: {refusal}")

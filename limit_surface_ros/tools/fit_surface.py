@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limit_surface_ros.checks import counted
 from limit_surface_ros.files.bag_pushes import Selection
 from limit_surface_ros.files.surface_file import write_surface_model
-from limit_surface_ros.fitting.multi_start import process_pool
+from limit_surface_ros.fitting.multi_start import AGREEMENT, process_pool
 from limit_surface_ros.fitting.worker_processes import available_cores
 from limit_surface_ros.tools.given_options import named_path, refuse_empty, refuse_unused
 from limit_surface_ros.tools.output_file import MODEL_SUFFIXES, check_output
@@ -32,7 +33,7 @@ from limit_surface_ros.tools.training_data import ACCEPTED, CONTACT_SUFFIXES, ch
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from limit_surface_ros.fitting.result import Errors
+    from limit_surface_ros.fitting.result import Errors, FitResult
     from limit_surface_ros.tools.surface_fit import FittedModel
 
 EXAMPLES = """examples:
@@ -46,6 +47,10 @@ EXAMPLES = """examples:
 OF_CONTACTS = ("motions", "facet_loads", "load_noise", "motion_noise")
 CHOSEN_BY_AUTO = ("kind", "terms", "family", "objective", "velocity_weight", "starts")
 OF_BAGS = ("wrench_topic", "motion_topic", *asdict(Selection()))
+
+
+# Costs closer than this differ by rounding.
+NO_COST = 1e-12
 
 
 def parser() -> argparse.ArgumentParser:
@@ -83,7 +88,7 @@ def report(fitted: FittedModel, output: Path) -> None:
     state = "converged" if result.converged else "not converged"
     print(f"objective   {result.objective}")
     print(f"cost        {result.cost:.6g}, {state} after {result.iterations} steps")
-    print(f"starts      {', '.join(f'{cost:.6g}' for cost in result.start_costs)}")
+    print(f"starts      {starts_in_words(result)}")
     print_errors("training", result.training)
     if result.held_out is not None:
         print_errors("held out", result.held_out)
@@ -91,11 +96,28 @@ def report(fitted: FittedModel, output: Path) -> None:
     print(f"written     {output}")
 
 
+def starts_in_words(result: FitResult) -> str:
+    """Tell how many starts led to the best cost, and what the next best was."""
+    costs, best = result.start_costs, result.start_costs[0]
+    others = [cost for cost in costs if cost > best * (1.0 + AGREEMENT) + NO_COST]
+    told = f"{len(costs) - len(others)} of {counted(len(costs), 'start')} agree"
+    if others:
+        told += f", the next best cost {min(others):.6g}"
+    if result.cost > result.details.get("projected_cost", result.cost):
+        # Of the second approximation alone, whose starts leave a matrix free to be indefinite.
+        told += (
+            f"; their best cost {best:.6g} is of a surface that is not closed, the cost above of "
+            "the model, which is closed: --terms 2 without --objective second may fit better"
+        )
+    return told
+
+
 def print_errors(label: str, errors: Errors) -> None:
     """Print one line of errors."""
     median, most, worst = errors.velocity
     print(
-        f"{label:<11} {errors.pairs} pairs: mean angle {np.degrees(errors.mean_angle):.2f} deg, "
+        f"{label:<11} {counted(errors.pairs, 'pair')}: mean angle "
+        f"{np.degrees(errors.mean_angle):.2f} deg, "
         f"velocity error {median:.3f} / {most:.3f} / {worst:.3f} (50 / 95 / 100 %)"
     )
 

@@ -7,10 +7,11 @@ import pytest
 
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
 from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.polynomial import Polynomial
 from limit_surface_ros.surface.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 from limit_surface_ros.tools import fit_surface
-from limit_surface_ros.tools.compare_surfaces import main
+from limit_surface_ros.tools.compare_surfaces import main, size_of
 
 CONTACT = """schema: 1
 name: triangle
@@ -129,6 +130,25 @@ def test_the_distributions_are_drawn(contact, tmp_path, capsys):
 def test_what_cannot_be_compared_is_refused(contact, capsys, arguments, message):
     assert main([str(contact), *arguments]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_a_model_that_is_not_convex_is_warned_of_in_one_plain_line(contact, tmp_path, capsys):
+    dented = tmp_path / "dented.yaml"
+    # x^4 + y^4 + m^4 + 12 x^2 y^2 bends inward.
+    cross = [1, 0, 0, 12, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1]
+    surface = Polynomial(cross, Scaling(0.08, 1.0))
+    write_surface_model(SurfaceModel("dented", surface), dented)
+    few = ["--motions", "20", "--facet-loads", "0"]
+    assert main([str(contact), "--models", str(dented), *few]) == 0
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("compare_surfaces: warning: limit surface 'dented' is not convex")
+
+
+def test_the_size_of_every_kind_is_how_many_numbers_define_it():
+    points = PointContacts([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]], [0.5, 0.5, 0.5])
+    assert size_of(points) == 9
+    assert size_of(points.dissipation()) == 18
+    assert size_of(PowerSum(np.eye(3)[None], [1.0])) == 6
 
 
 def test_a_kind_that_the_data_cannot_support_is_left_out_with_its_reason(contact, capsys):

@@ -2,8 +2,10 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +15,12 @@ from catalogue_helpers import group_is_gone, started, until
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.fitting.bootstrap import surfaces_of
+from limit_surface_ros.fitting.result import Errors, FitResult
 from limit_surface_ros.surface.measures import mean_angle
 from limit_surface_ros.surface.point_contacts import PointContacts
 from limit_surface_ros.surface.sampling import random_motions
 from limit_surface_ros.surface.scaling import Scaling
-from limit_surface_ros.tools.fit_surface import main
+from limit_surface_ros.tools.fit_surface import main, starts_in_words
 
 RECORDED = Path(__file__).parents[3] / "shared" / "data" / "pushing"
 TRIANGLE = PointContacts(
@@ -184,6 +187,25 @@ def test_pushes_that_state_no_frame_are_of_the_frame_object(pushes, tmp_path):
     output = tmp_path / "model.yaml"
     assert main([str(pushes), "-o", str(output), "--terms", "1", "--starts", "1"]) == 0
     assert read_surface_model(output).frame_id == "object"
+
+
+def test_costs_of_starts_are_told_in_one_short_line(tmp_path, capsys):
+    contact = tmp_path / "contact.yaml"
+    contact.write_text(CONTACT)
+    few = ["--motions", "200", "--facet-loads", "5", "--terms", "2", "--starts", "8"]
+    assert main([str(contact), "-o", str(tmp_path / "m.yaml"), *few]) == 0
+    (line,) = [x for x in capsys.readouterr().out.splitlines() if x.startswith("starts")]
+    assert re.fullmatch(r"starts +\d of \d starts agree(, the next best cost [\d.]+)?", line)
+
+
+def test_the_second_approximation_says_what_its_cost_is_beside_that_of_its_starts():
+    errors = Errors(60, np.zeros(3), 0.0)
+    result = FitResult(None, "", 7.9, (3.5, 3.5, 4.2), 1, 0.0, True, 0.0, errors)
+    assert starts_in_words(result) == "2 of 3 starts agree, the next best cost 4.2"
+    second = replace(result, details={"projected_cost": 3.5})
+    assert "their best cost 3.5 is of a surface that is not closed" in starts_in_words(second)
+    closed = replace(second, cost=3.5)
+    assert "not closed" not in starts_in_words(closed)
 
 
 def test_the_input_is_never_overwritten(tmp_path, capsys):
