@@ -19,8 +19,16 @@ if TYPE_CHECKING:
     Bools: TypeAlias = NDArray[np.bool_]
     Places: TypeAlias = NDArray[np.intp]
 
+# Components beyond these are no loads or motions of this world, and products of them overflow.
+LARGEST = 1.0e100
+SMALLEST = 1.0e-100
 _REAL = (float, int)
 _INFINITY = float("inf")
+
+
+def counted(count: int, noun: str) -> str:
+    """Return a count with its noun, "1 pair" or "2 pairs", for messages."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def as_floats(name: str, values: ArrayLike) -> Floats:

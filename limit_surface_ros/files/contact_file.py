@@ -7,7 +7,7 @@ Support points: `points` ([x, y] each) and `friction_limits` (mu N of each); `no
 whole body is optional: it tells at which weight the limits hold.
 
 A patch: `friction_coefficient`, `normal_force` of the whole body, `cells` (about how many, default
-1000) and
+1000, at most a million) and
   `shape`: a `kind` with its own keys, and for all `centre` [x, y] and `angle` in radians
     polygon: vertices, holes      disc: radius          ring: inner_radius, outer_radius
     ellipse: semi_axes            rectangle: size       line: start, end
@@ -39,6 +39,11 @@ if TYPE_CHECKING:
     from limit_surface_ros.surface.shapes import Cells
 
 SCHEMA = 1
+# Cells of a patch at most: more take gigabytes, and loads are exact to 1e-6 long before.
+MOST_CELLS = 1_000_000
+
+
+_ACCEPTED = "a contact has either `points` or a `shape`"
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +74,7 @@ def read_contact(path: str | Path) -> ContactModel:
         MissingExtraError: The shape is a polygon and shapely is not installed.
     """
     section = read_yaml(path)
+    _refuse_models(section)
     section.choice("schema", [SCHEMA])
     name = section.text("name")
     frame_id = section.text("frame_id", "object")
@@ -78,15 +84,29 @@ def read_contact(path: str | Path) -> ContactModel:
     elif "shape" in section:
         model = _read_patch(section, name, frame_id, reference)
     else:
-        raise section.error("points", "missing; a contact has either `points` or a `shape`")
+        raise section.error("points", f"missing; {_ACCEPTED}")
     section.finish()
     return model
 
 
+def _refuse_models(section: Section) -> None:
+    """Name what takes a file that is no contact, but a model."""
+    if "kind" in section:
+        kind, program = (
+            ("decay", "plot_decay") if "rates" in section else ("surface", "plot_surface")
+        )
+        raise section.error("kind", f"this is a {kind} model: {program} draws it; {_ACCEPTED}")
+
+
 def _read_reference_point(section: Section) -> Floats | None:
     """Return the reference point, None for the centroid."""
-    if section.raw("reference_point", "centroid") == "centroid":
+    given = section.raw("reference_point", "centroid")
+    if given == "centroid":
         return None
+    if isinstance(given, str):
+        raise section.error(
+            "reference_point", f"must be centroid, or [x, y] in metres, got {given!r}"
+        )
     point: Floats = section.array("reference_point", (2,))
     return point
 
@@ -95,7 +115,7 @@ def _read_points(
     section: Section, name: str, frame_id: str, reference: Floats | None
 ) -> ContactModel:
     points = section.array("points", (None, 2))
-    limits = section.array("friction_limits", (len(points),))
+    limits = section.array("friction_limits", (len(points),), at_least=0.0)
     force = section.number("normal_force", above=0.0) if "normal_force" in section else None
     chosen = points.mean(axis=0) if reference is None else reference
 
@@ -113,7 +133,7 @@ def _read_patch(
 ) -> ContactModel:
     mu = section.number("friction_coefficient", above=0.0)
     force = section.number("normal_force", above=0.0)
-    count = section.integer("cells", shapes.DEFAULT_COUNT, at_least=1)
+    count = section.integer("cells", shapes.DEFAULT_COUNT, at_least=1, at_most=MOST_CELLS)
     shape = section.section("shape")
     cells, mapped = place_errors(section, "shape", lambda: _read_shape(shape, count))
     shape.finish()

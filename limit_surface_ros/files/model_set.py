@@ -51,7 +51,7 @@ class ModelSet(Generic[Model]):
         self._models: dict[str, Model] = {}
         for model in models:
             if model.name in self._models:
-                raise FileError(f"two model files hold a model named {model.name!r}")
+                raise FileError(f"two models are named {model.name!r}: names must differ")
             self._models[model.name] = model
         if not self._models:
             raise FileError("no model file is given; at least one is needed")
@@ -103,7 +103,8 @@ def model_paths(entries: Iterable[str | Path]) -> list[Path]:
             raise
         except (OSError, RuntimeError, ValueError) as error:
             # No permission, a name too long, no home folder, a NUL character.
-            raise FileError(f"{entry}: cannot be read: {error}") from None
+            reason = getattr(error, "strerror", None) or error
+            raise FileError(f"{entry}: cannot be read: {reason}") from None
     return paths
 
 
@@ -113,8 +114,10 @@ def _paths_of(path: Path) -> list[Path]:
         if not inside:
             raise FileError(f"{path}: the folder holds no *.yaml file")
         return inside
-    if not path.exists():
-        raise FileError(f"{path}: no such file or folder")
+    try:
+        path.stat()
+    except FileNotFoundError:
+        raise FileError(f"{path}: no such file or folder") from None
     return [path]
 
 
@@ -136,4 +139,15 @@ def read_model_set(
         FileError: A file is absent or not valid, or two models share a name.
         UnknownModelError: The default is not among the models.
     """
-    return ModelSet([read(path) for path in model_paths(entries)], default, noun)
+    models: list[Model] = []
+    places: dict[str, Path] = {}
+    for path in model_paths(entries):
+        model = read(path)
+        if model.name in places:
+            raise FileError(
+                f"{path}: holds a model named {model.name!r}, as {places[model.name]} does: "
+                "names must differ"
+            )
+        places[model.name] = path
+        models.append(model)
+    return ModelSet(models, default, noun)

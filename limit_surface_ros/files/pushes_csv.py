@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from limit_surface_ros.checks import LARGEST, SMALLEST
 from limit_surface_ros.errors import DataError, FileError
 from limit_surface_ros.files.csv_row import cells_of
 from limit_surface_ros.surface.pairs import Pairs
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 WRENCH_COLUMNS = ("fx_N", "fy_N", "tau_Nm")
 TWIST_COLUMNS = ("vx", "vy", "omega")
 COLUMNS = WRENCH_COLUMNS + TWIST_COLUMNS
+_BY_COMMAS = "; columns are separated by commas"
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,8 @@ class Pushes:
 
     def rest(self, numbers: Sequence[int]) -> Pairs:
         """Return the pairs of all other rows."""
-        return self.rows([i for i in range(len(self.pairs)) if i not in set(numbers)])
+        chosen = set(numbers)
+        return self.rows([i for i in range(len(self.pairs)) if i not in chosen])
 
     def number(self, key: str) -> float | None:
         """Return a number above zero that the first line gives, or None where it gives none.
@@ -76,10 +78,10 @@ class Pushes:
         if value is None:
             return None
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        # An integer of JSON may be larger than any float.
-        if not is_number or not 0.0 < value <= sys.float_info.max:
+        if not is_number or not 0.0 < value <= LARGEST:
             raise FileError(
-                f"{self.path}: line 1: {key} must be a number above 0, got {value!r:.60}"
+                f"{self.path}: line 1: {key} must be a number above 0, at most {LARGEST:g}, "
+                f"got {value!r:.60}"
             )
         return float(value)
 
@@ -98,8 +100,9 @@ class Pushes:
         except (TypeError, ValueError, OverflowError):
             places, forces = np.empty(0), np.empty(0)
         sound = places.ndim == 2 and places.shape == (forces.size, 2) and forces.size > 0
-        finite = np.isfinite(places).all() and np.isfinite(forces).all()
-        if not sound or not finite or not (forces > 0.0).all():
+        # NaN fails this.
+        known = (np.abs(places) <= LARGEST).all() and (forces <= LARGEST).all()
+        if not sound or not known or not (forces > 0.0).all():
             raise FileError(
                 f"{self.path}: line 1: support_points_m_body_frame must be points [x, y] and "
                 "support_loads_N one load above 0 for each"
@@ -153,9 +156,10 @@ def _columns(path: Path, number: int, line: str) -> list[str]:
     for name in COLUMNS:
         if names.count(name) != 1:
             found = "is missing" if name not in names else "is given twice"
+            hint = "" if len(names) > 1 else _BY_COMMAS
             raise FileError(
                 f"{path}: line {number}: column {name} {found}; needed are "
-                f"{', '.join(COLUMNS)}, got {', '.join(names)}"
+                f"{', '.join(COLUMNS)}, got {', '.join(names)}{hint}"
             )
     return names
 
@@ -165,7 +169,8 @@ def _row(path: Path, number: int, line: str, columns: list[str]) -> list[float]:
     place = f"{path}: line {number}"
     cells = cells_of(path, number, line)
     if len(cells) != len(columns):
-        raise FileError(f"{place}: has {len(cells)} cells, the columns are {len(columns)}")
+        hint = "" if len(cells) > 1 else _BY_COMMAS
+        raise FileError(f"{place}: has {len(cells)} cells, the columns are {len(columns)}{hint}")
     values = []
     for name in COLUMNS:
         cell = cells[columns.index(name)]
@@ -175,8 +180,16 @@ def _row(path: Path, number: int, line: str, columns: list[str]) -> list[float]:
             raise FileError(f"{place}: column {name}: {cell!r} is not a number") from None
         if not math.isfinite(value):
             raise FileError(f"{place}: column {name}: must be finite, got {cell}")
+        if abs(value) > LARGEST:
+            raise FileError(
+                f"{place}: column {name}: must be at most {LARGEST:g} in size, got {cell}"
+            )
         values.append(value)
     for what, part in (("wrench", values[:3]), ("twist", values[3:])):
         if not any(part):
             raise FileError(f"{place}: the {what} is zero: it has no direction")
+        if max(map(abs, part)) < SMALLEST:
+            raise FileError(
+                f"{place}: the {what} is below {SMALLEST:g} in size, too small for a direction"
+            )
     return values

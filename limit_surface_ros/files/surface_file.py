@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 SCHEMA = 1
 # Scales [m], [N] beyond this and its reciprocal would take answers out of the range of numbers.
-_LARGEST_SCALE = 1e12
+LARGEST_SCALE = 1e12
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,9 @@ def _read_dissipation(section: Section, scaling: Scaling) -> LimitSurface:
 
 def _read_point_contacts(section: Section, scaling: Scaling) -> LimitSurface:
     points = section.array("points", (None, 2))
-    return PointContacts(points, section.array("friction_limits", (len(points),)), scaling)
+    return PointContacts(
+        points, section.array("friction_limits", (len(points),), at_least=0.0), scaling
+    )
 
 
 def _read_polynomial(section: Section, scaling: Scaling) -> LimitSurface:
@@ -123,10 +125,14 @@ def read_surface_model(path: str | Path) -> SurfaceModel:
     section.choice("schema", [SCHEMA])
     if "kind" not in section and ("points" in section or "shape" in section):
         raise section.error("kind", "missing; this is a contact file: fit_surface fits it")
+    if "rates" in section:
+        raise section.error(
+            "kind", "this is a decay model: plot_decay draws it and decay_node serves it"
+        )
     kind = section.choice("kind", list(_READERS))
     scaling = Scaling(
         *(
-            section.number(key, at_least=1.0 / _LARGEST_SCALE, at_most=_LARGEST_SCALE)
+            section.number(key, at_least=1.0 / LARGEST_SCALE, at_most=LARGEST_SCALE)
             for key in ("characteristic_length", "friction_force")
         )
     )

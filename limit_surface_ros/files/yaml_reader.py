@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import yaml
 
+from limit_surface_ros.checks import LARGEST
 from limit_surface_ros.errors import FileError, LimitSurfaceError
 
 if TYPE_CHECKING:
@@ -109,31 +110,33 @@ class Section:
         """Return the error that places `message` at `key` of this file."""
         return FileError(f"{self.path}: {self._prefix}{key}: {message}")
 
-    def _get(self, key: str, default: Any) -> Any:
+    def _get(self, key: str, default: Any, accepted: str = "") -> Any:
+        """Return a value, or the default; `accepted` says in words what is, for the error."""
         self._known.append(key)
         value = self.values.get(key)
         if value is not None:
             return value
         if default is _REQUIRED:
-            raise self.error(key, "missing")
+            raise self.error(key, f"missing; it must be {accepted}" if accepted else "missing")
         return default
 
     def text(self, key: str, default: Any = _REQUIRED) -> Any:
         """Return a text that is not empty, or the default as it is."""
-        value = self._get(key, default)
+        accepted = "a text that is not empty"
+        value = self._get(key, default, accepted)
         if value is default:
             return default
         if not isinstance(value, str) or not value.strip():
-            raise self.error(key, f"must be a text that is not empty, got {_shown(value)}")
+            raise self.error(key, f"must be {accepted}, got {_shown(value)}")
         return value
 
     def choice(self, key: str, accepted: Collection[Any], default: Any = _REQUIRED) -> Any:
         """Return one of the accepted values."""
-        value = self._get(key, default)
+        listed = f"one of {', '.join(str(option) for option in accepted)}"
+        value = self._get(key, default, listed)
         # True == 1 in Python, but a schema of `true` is a mistake.
         if value not in accepted or isinstance(value, bool):
-            listed = ", ".join(str(option) for option in accepted)
-            raise self.error(key, f"must be one of {listed}; got {_shown(value)}")
+            raise self.error(key, f"must be {listed}; got {_shown(value)}")
         return value
 
     def number(
@@ -146,60 +149,83 @@ class Section:
         at_most: float = math.inf,
     ) -> Any:
         """Return a finite float within the bounds, or the default as it is."""
-        value = self._get(key, default)
+        bounds = [f"above {above}"] * (above > -math.inf)
+        bounds += [f"at least {at_least}"] * (at_least > -math.inf)
+        bounds += [f"at most {at_most}"] * (at_most < math.inf)
+        accepted = " and ".join(bounds)
+        value = self._get(key, default, f"a number {accepted}".rstrip())
         if value is default:
             return default
         number = self._finite(key, value)
         if not (number > above and at_least <= number <= at_most):
-            bounds = [f"above {above}"] * (above > -math.inf)
-            bounds += [f"at least {at_least}"] * (at_least > -math.inf)
-            bounds += [f"at most {at_most}"] * (at_most < math.inf)
-            raise self.error(key, f"must be {' and '.join(bounds)}, got {number}")
+            raise self.error(key, f"must be {accepted}, got {number}")
         return number
 
-    def integer(self, key: str, default: Any = _REQUIRED, *, at_least: int = 0) -> Any:
-        """Return a whole number not below `at_least`, or the default as it is."""
-        value = self._get(key, default)
+    def integer(
+        self,
+        key: str,
+        default: Any = _REQUIRED,
+        *,
+        at_least: int = 0,
+        at_most: int | None = None,
+    ) -> Any:
+        """Return a whole number within the bounds, or the default as it is."""
+        accepted = f"a whole number from {at_least} {'on' if at_most is None else f'to {at_most}'}"
+        value = self._get(key, default, accepted)
         if value is default:
             return default
-        if isinstance(value, bool) or not isinstance(value, int) or value < at_least:
-            raise self.error(
-                key, f"must be a whole number from {at_least} on, got {_shown(value)}"
-            )
+        whole = isinstance(value, int) and not isinstance(value, bool)
+        if not whole or value < at_least or (at_most is not None and value > at_most):
+            raise self.error(key, f"must be {accepted}, got {_shown(value)}")
         return value
 
-    def array(self, key: str, shape: tuple[int | None, ...], default: Any = _REQUIRED) -> Any:
+    def array(
+        self,
+        key: str,
+        shape: tuple[int | None, ...],
+        default: Any = _REQUIRED,
+        *,
+        at_least: float = -math.inf,
+    ) -> Any:
         """Return a float64 array of that shape; None stands for any length above zero.
 
         Raises:
-            FileError: The key is missing, no array of finite numbers, or of another shape.
+            FileError: The key is missing, no array of finite numbers, of another shape, or a
+                number is below `at_least`; the message gives its place.
         """
-        value = self._get(key, default)
+        wanted = " x ".join("n" if length is None else str(length) for length in shape)
+        value = self._get(key, default, f"an array of {wanted} numbers")
         if value is default:
             return default
         array = self._nested_floats(key, value, len(shape) + 1)
         fits = array.ndim == len(shape) and all(
-            given > 0 if wanted is None else given == wanted
-            for given, wanted in zip(array.shape, shape, strict=True)
+            given > 0 if length is None else given == length
+            for given, length in zip(array.shape, shape, strict=True)
         )
         if not fits:
-            wanted = " x ".join("n" if length is None else str(length) for length in shape)
             given = " x ".join(map(str, array.shape)) or "a single number"
             raise self.error(key, f"must be an array of {wanted} numbers, got {given}")
+        for place in np.argwhere(array < at_least)[:1].tolist():
+            index = "".join(f"[{i}]" for i in place)
+            raise self.error(
+                f"{key}{index}", f"must be at least {at_least}, got {array[tuple(place)]}"
+            )
         return array
 
     def section(self, key: str, default: Any = _REQUIRED) -> Section:
         """Return the mapping under a key."""
-        value = self._get(key, default)
+        accepted = "a mapping of keys to values"
+        value = self._get(key, default, accepted)
         if not isinstance(value, dict):
-            raise self.error(key, f"must be a mapping of keys to values, got {_shown(value)}")
+            raise self.error(key, f"must be {accepted}, got {_shown(value)}")
         return Section(self.path, value, f"{self._prefix}{key}.")
 
     def sections(self, key: str) -> list[Section]:
         """Return the mappings in the list under a key."""
-        value = self._get(key, _REQUIRED)
+        accepted = "a list of mappings"
+        value = self._get(key, _REQUIRED, accepted)
         if not isinstance(value, list) or not value:
-            raise self.error(key, f"must be a list of mappings, got {_shown(value)}")
+            raise self.error(key, f"must be {accepted}, got {_shown(value)}")
         for i, item in enumerate(value):
             if not isinstance(item, dict):
                 raise self.error(f"{key}[{i}]", f"must be a mapping, got {_shown(item)}")
@@ -252,6 +278,8 @@ class Section:
             number = math.inf
         if not math.isfinite(number):
             raise self.error(key, f"must be finite, got {value}")
+        if abs(number) > LARGEST:
+            raise self.error(key, f"must be at most {LARGEST:g} in size, got {value}")
         return number
 
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.errors import DataError, LimitSurfaceError, RangeError
-from limit_surface_ros.fitting.recipe import FEWEST_PAIRS, Recipe, Workbench
-from limit_surface_ros.fitting.scaled_pairs import check_support, scale_pairs
+from limit_surface_ros.fitting.recipe import FEWEST_PAIRS, Recipe, Workbench, check_pushes
+from limit_surface_ros.fitting.scaled_pairs import scale_pairs
 from limit_surface_ros.surface.measures import angle_error
 from limit_surface_ros.surface.pairs import Pairs
 
@@ -104,7 +104,7 @@ def choose_recipe(
     if folds < 2:
         raise RangeError(f"folds must be at least 2, got {folds}")
     scaled = scale_pairs(pairs, scaling)
-    check_support(scaled, FEWEST_PAIRS + 2)
+    check_pushes(scaled, FEWEST_PAIRS + 2)
     if folds > count:
         raise RangeError(f"folds must be at most one for each of the {count} pushes, got {folds}")
     scaling = scaled.scaling

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from limit_surface_ros.checks import counted
 from limit_surface_ros.errors import DataError, RangeError, SolverError
 from limit_surface_ros.fitting.combined_objectives import HeldObjective
 from limit_surface_ros.fitting.dissipation_direction_objective import (
@@ -98,7 +99,7 @@ class Recipe:
         """Return the recipe in words."""
         words: list[str] = [self.kind if self.kind == "dissipation" else "power_sum (norms)"]
         if self.towards != "support":
-            words.append(f"{self.terms} terms")
+            words.append(counted(self.terms, "term"))
         words.append(f"velocity weight {self.velocity_weight:g}")
         if self.towards != "nothing":
             words.append(f"towards {self.towards} {self.strength:g}")
@@ -135,7 +136,7 @@ class Workbench:
             DataError: They cannot determine a surface.
         """
         scaled = scale_pairs(self.pairs, self.scaling)
-        check_support(scaled, FEWEST_PAIRS)
+        check_pushes(scaled, FEWEST_PAIRS)
         return scaled if self.weights is None else scaled.weighted(self.weights)
 
     def fit(self, recipe: Recipe) -> tuple[LimitSurface, Descent]:
@@ -197,6 +198,20 @@ class Workbench:
                 pairs, recipe.terms, weight, _ROBUST_SCALE, _FLOOR
             )
         return PowerSumObjective(pairs, np.full(recipe.terms, 0.5), weight, _ROBUST_SCALE)
+
+
+def check_pushes(pairs: ScaledPairs, fewest: int) -> None:
+    """Refuse pushes that say nothing, whatever a fit is held towards.
+
+    Raises:
+        DataError: They are fewer than `fewest`, or see `check_support`.
+    """
+    if len(pairs) < fewest:
+        raise DataError(
+            f"{len(pairs)} pushes are too few, even for a fit that is held towards a simpler "
+            f"one: at least {fewest} are needed"
+        )
+    check_support(pairs, 0)
 
 
 def _ellipsoid_pairs(pairs: ScaledPairs, weight: float, strength: float) -> ScaledPairs:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limit_surface_ros.checks import counted
 from limit_surface_ros.errors import DataError
 from limit_surface_ros.surface.scaling import Scaling
 
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 _ONE_DIRECTION = 0.98
 # Relative second moment below which the loads leave a direction of load untried.
 _UNTRIED = 1e-8
+# Parts of a load, and how much of an axis is along one of them if it is named after it.
+_PARTS = ("force along x", "force along y", "moment")
+_PURE = 0.999
 # The same pairs in other units differ by rounding, which can lead a descent to another minimum
 # where costs have kinks. Far below any measurement they are made the same.
 _DECIMALS = 9
@@ -141,8 +145,8 @@ def check_support(pairs: ScaledPairs, parameters: int) -> None:
     count = len(pairs)
     if count < max(parameters, 1):
         raise DataError(
-            f"{count} pairs cannot determine {parameters} parameters: give more pairs, fewer "
-            "terms, or a fit that is held by a prior"
+            f"{counted(count, 'pair')} cannot determine {parameters} parameters: give more "
+            "pairs, fewer terms, or choose the fit that is held towards a simpler one (--auto)"
         )
     against = int(np.count_nonzero(np.sum(pairs.wrenches * pairs.directions, axis=1) < 0.0))
     if against > count / 2:
@@ -160,8 +164,17 @@ def check_support(pairs: ScaledPairs, parameters: int) -> None:
     scaled = pairs.wrenches / np.abs(pairs.wrenches).max()
     loads, axes = np.linalg.eigh(scaled.T @ scaled / count)
     if loads[0] <= _UNTRIED * loads[-1]:
-        untried = ", ".join(f"{component:.2f}" for component in axes[:, 0])
         raise DataError(
-            f"no load has a component along the scaled direction ({untried}): "
-            "the surface is unbounded there"
+            f"{_untried(axes[:, 0])}: nothing tells how much of it the ground holds; give pushes "
+            "that have some (support points that coincide, or a characteristic length far from "
+            "the body's size, leave moments out)"
         )
+
+
+def _untried(axis: Floats) -> str:
+    """Say which part of a load, a unit vector in scaled variables, no load has."""
+    for name, component in zip(_PARTS, axis, strict=True):
+        if abs(component) > _PURE:
+            return f"no load has a {name}"
+    parts = ", ".join(f"{component:.2f}" for component in axis)
+    return f"no load has a part along (f_x, f_y, tau_z / characteristic length) = ({parts})"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,8 +42,11 @@ def simulated_pairs(
     Raises:
         RangeError: A count or a noise is negative, or there is nothing to draw.
     """
-    if min(load_noise, motion_noise, per_facet) < 0:
-        raise RangeError("per_facet, load_noise and motion_noise must not be negative")
+    given = {"per_facet": per_facet, "load_noise": load_noise, "motion_noise": motion_noise}
+    for name, value in given.items():
+        # NaN fails this.
+        if not 0 <= value < math.inf:
+            raise RangeError(f"{name} must be a finite number from 0 on, got {value}")
     draw, noise = (np.random.default_rng([seed, part]) for part in (0, 1))
     parts = [random_motions(contacts, motions, draw)]
     if per_facet and len(contacts.points) <= _MOST_FACETED:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limit_surface_ros.checks import LARGEST, SMALLEST
 from limit_surface_ros.errors import (
     LimitSurfaceError,
     NotFiniteError,
@@ -23,9 +24,6 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.checks import Floats
 
-# Components beyond these are no loads or motions of this world, and products of them overflow.
-LARGEST = 1.0e100
-SMALLEST = 1.0e-100
 _WRENCH = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 _TWIST = ("linear.x", "linear.y", "linear.z", "angular.x", "angular.y", "angular.z")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Generic
 
@@ -52,6 +53,7 @@ class ModelHost(Generic[Model]):
     Args:
         parameters: The node's parameters, which include `model_settings`.
         read: Reader of one file.
+        warn: Called with what is to be said of a model that is accepted.
         files: Name of the parameter that names the files.
         default: Name of the parameter that names the default model.
         noun: What a request calls such a model, for messages.
@@ -71,6 +73,7 @@ class ModelHost(Generic[Model]):
         self,
         parameters: Parameters,
         read: Callable[[Path], Model],
+        warn: Callable[[str], object],
         files: str = "model_files",
         default: str = "default_model",
         noun: str = "model",
@@ -78,6 +81,7 @@ class ModelHost(Generic[Model]):
         """Read the models that the parameters name."""
         self._noun = noun
         self._read = read
+        self._warn = warn
         self.names = (files, default)
         parameters.concern(self.names, self._prepare)
 
@@ -94,7 +98,11 @@ class ModelHost(Generic[Model]):
 
     def _prepare(self, values: Values) -> Callable[[], None]:
         files, default = (values[name] for name in self.names)
-        models = read_model_set(resolved(files), self._read, default, self._noun)
+        # Warnings belong into the node's log, not to standard error with a line of our source.
+        with warnings.catch_warnings(record=True) as raised:
+            models = read_model_set(resolved(files), self._read, default, self._noun)
+        for warning in raised:
+            self._warn(str(warning.message))
 
         def apply() -> None:
             self.models = models

@@ -74,7 +74,7 @@ class ModelNode(Node, Generic[Model]):
         super().__init__(name, **options)
         try:
             self.values = Parameters(self, [*settings, *COMMON_SETTINGS])
-            self.models = ModelHost(self.values, read)
+            self.models = ModelHost(self.values, read, self.get_logger().warning)
             self._hosts: list[ModelHost[Any]] = [self.models]
         except Exception:
             self.destroy_node()
@@ -106,7 +106,7 @@ class ModelNode(Node, Generic[Model]):
             LimitSurfaceError: A file is not accepted.
         """
         try:
-            host = ModelHost(self.values, read, files, default, noun)
+            host = ModelHost(self.values, read, self.get_logger().warning, files, default, noun)
         except Exception:
             self.destroy_node()
             raise

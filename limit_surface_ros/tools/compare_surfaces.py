@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from limit_surface_ros.checks import counted
 from limit_surface_ros.errors import DataError, LimitSurfaceError, RangeError
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.fitting.bootstrap import surfaces_of, twist_spread
@@ -26,17 +27,34 @@ from limit_surface_ros.fitting.multi_start import Search, process_pool
 from limit_surface_ros.fitting.result import errors_on
 from limit_surface_ros.fitting.scaled_pairs import scaling_of_pairs
 from limit_surface_ros.fitting.worker_processes import available_cores
+from limit_surface_ros.plots.canvas import SUFFIXES, new_figure, save_figure
+from limit_surface_ros.plots.distributions import draw_distributions
+from limit_surface_ros.surface.dissipation import Dissipation
 from limit_surface_ros.surface.measures import load_error, quantiles, velocity_error
+from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.polynomial import Polynomial
+from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.tools.given_options import named_path
+from limit_surface_ros.tools.output_file import check_output
 from limit_surface_ros.tools.program import run_program
 from limit_surface_ros.tools.progress import progress_bar
-from limit_surface_ros.tools.surface_fit import add_fit_options, fit, read_input
+from limit_surface_ros.tools.same_point import About, require_one_point
+from limit_surface_ros.tools.surface_fit import (
+    RANGES,
+    add_fit_options,
+    check_fit_options,
+    fit,
+    read_input,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.files.surface_file import SurfaceModel
     from limit_surface_ros.surface.pairs import Pairs
     from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.tools.training_data import TrainingData
 
 EXAMPLES = """examples:
   compare_surfaces contact.yaml --models a.yaml b.yaml
@@ -69,6 +87,8 @@ FITS: dict[str, dict[str, object]] = {
     "second": {"kind": "power_sum", "objective": "second"},
     "auto": {"auto": True},
 }
+# Those of them that a number of terms may follow.
+WITH_TERMS = ("thesis", "norms", "dissipation")
 
 
 def parser() -> argparse.ArgumentParser:
@@ -79,14 +99,17 @@ def parser() -> argparse.ArgumentParser:
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    top.add_argument("data", type=Path, help="a contact file, recorded pushes, or a ROS 2 bag")
+    top.add_argument(
+        "data", type=named_path, help="a contact file, recorded pushes, or a ROS 2 bag"
+    )
     top.add_argument("--models", nargs="+", type=Path, default=[], help="model files")
     top.add_argument(
         "--fit",
         nargs="+",
         default=[],
         metavar="KIND[:TERMS]",
-        help=f"kinds to fit: {', '.join(FITS)}, with a number of terms such as norms:4",
+        help=f"kinds to fit: {', '.join(FITS)}; {', '.join(WITH_TERMS)} with a number of terms, "
+        "such as norms:4",
     )
     top.add_argument("--picture", type=Path, help="write the errors' distributions to this file")
     top.add_argument("--workers", type=int, default=available_cores(), help="(%(default)s)")
@@ -98,13 +121,16 @@ def options_of(options: argparse.Namespace, wanted: str) -> argparse.Namespace:
     """Return the options that a word such as norms:4 stands for.
 
     Raises:
-        RangeError: There is no such kind, or the terms are no number.
+        RangeError: There is no such kind, or the terms are no number or not for it.
     """
     kind, colon, terms = wanted.partition(":")
-    if kind not in FITS or (colon and not terms.isdigit()):
+    least, most = RANGES["terms"]
+    if colon and kind in FITS and kind not in WITH_TERMS:
+        raise RangeError(f"--fit {kind} takes no number of terms; got {wanted!r}")
+    if kind not in FITS or (colon and not (terms.isdecimal() and least <= int(terms) <= most)):
         raise RangeError(
-            f"--fit takes {', '.join(FITS)}, with a number of terms such as norms:4; "
-            f"got {wanted!r}"
+            f"--fit takes {', '.join(FITS)}; {', '.join(WITH_TERMS)} with a number of terms from "
+            f"{least} to {most}, such as norms:4; got {wanted!r}"
         )
     chosen = copy.copy(options)
     for key, value in FITS[kind].items():
@@ -115,12 +141,14 @@ def options_of(options: argparse.Namespace, wanted: str) -> argparse.Namespace:
 
 
 def size_of(surface: LimitSurface) -> int:
-    """Return how many numbers define a surface: six for each symmetric matrix."""
-    if hasattr(surface, "matrices"):
-        return 6 * len(surface.matrices)
-    if hasattr(surface, "coefficients"):
-        return int(np.size(surface.coefficients))
-    return int(np.size(getattr(surface, "points", 0)) * 3 // 2)
+    """Return how many numbers define a surface of a kind that model files hold."""
+    if isinstance(surface, (PowerSum, Dissipation)):
+        return 6 * len(surface.matrices)  # a symmetric matrix each
+    if isinstance(surface, Polynomial):
+        return len(surface.coefficients)
+    if isinstance(surface, PointContacts):
+        return 3 * len(surface.points)  # x, y and friction limit each
+    raise TypeError(f"no size is known of a {surface.kind}")
 
 
 def microseconds_each(function: Callable[[Floats], Floats], vectors: Floats) -> float:
@@ -184,9 +212,16 @@ def run(options: argparse.Namespace) -> None:
     """Read, fit, measure, print, draw."""
     if not options.models and not options.fit:
         raise RangeError("nothing to compare: give --models or --fit")
+    check_fit_options(options)
     wanted = {word: options_of(options, word) for word in options.fit}
+    if options.picture is not None:
+        # Before the fits, and not after them, if the picture cannot be made.
+        check_output(options.picture, SUFFIXES, [options.data, *options.models])
+        with new_figure(1.0, 1.0):
+            pass
     stored = {path: read_surface_model(path) for path in options.models}
     data = read_input(options.data, options)
+    require_one_point(stated_points(options.data, data, stored))
     test = data.held_out or data.training
     stems = [path.stem for path in stored]
     surfaces = [
@@ -211,13 +246,23 @@ def run(options: argparse.Namespace) -> None:
     if not surfaces:
         raise DataError(f"nothing to compare is left: {'; '.join(refusals)}")
     kept = "held out" if data.held_out is not None else "fitted"
-    print(f"{options.data}: {len(test)} pairs, {kept}")
+    print(f"{options.data}: {counted(len(test), 'pair')}, {kept}")
     print_table([row_of(each, test) for each in surfaces])
     for refusal in refusals:
         print(f"left out: {refusal}")
     if options.picture is not None:
         draw(surfaces, test, options.picture)
         print(f"written     {options.picture}")
+
+
+def stated_points(
+    path: Path, data: TrainingData, stored: Mapping[Path, SurfaceModel]
+) -> list[About]:
+    """Return what data and models are about, as far as their files state it."""
+    stated = [About(each, model.frame_id, model.reference_point) for each, model in stored.items()]
+    if data.frame_id is not None:
+        stated.insert(0, About(path, data.frame_id, data.reference_point))
+    return stated
 
 
 def print_table(rows: list[list[str]]) -> None:
@@ -230,15 +275,7 @@ def print_table(rows: list[list[str]]) -> None:
 
 
 def draw(surfaces: Sequence[Compared], test: Pairs, path: Path) -> None:
-    """Draw the distributions of the errors of motion.
-
-    Raises:
-        MissingExtraError: matplotlib is not installed.
-        FileError: The picture cannot be written.
-    """
-    from limit_surface_ros.plots.canvas import new_figure, save_figure
-    from limit_surface_ros.plots.distributions import draw_distributions
-
+    """Draw the distributions of the errors of motion."""
     errors = {each.name: velocity_error(each.surface, test) for each in surfaces}
     with new_figure(7.0, 4.5) as figure:
         draw_distributions(figure.subplots(), errors, "error of motion |v - v^| of unit twists")

@@ -15,7 +15,7 @@ from limit_surface_ros.decay.targets import Record
 from limit_surface_ros.errors import DataError, FileError, RangeError
 from limit_surface_ros.files.bag_reader import read_topic
 from limit_surface_ros.files.response_csv import read_response
-from limit_surface_ros.tools.given_options import MODEL_SUFFIXES
+from limit_surface_ros.tools.output_file import MODEL_SUFFIXES
 
 if TYPE_CHECKING:
     import argparse

@@ -5,11 +5,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from limit_surface_ros import __version__
-from limit_surface_ros.errors import ClusterError, MissingExtraError
+from limit_surface_ros.errors import ClusterError, MissingExtraError, RangeError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -17,8 +18,23 @@ if TYPE_CHECKING:
 
 # Jobs handed to a cluster at a time: enough for some hundred workers, little for its scheduler.
 CLUSTER_IN_FLIGHT = 1000
+# Such as tcp://host:8786: Dask tries anything else for half a minute.
+_ADDRESS = re.compile(r"([a-z]+://)?[^/\s]+:[0-9]+/?")
 _CONNECT_TIME = 10.0
 _WORKER_TIME = 30.0
+
+
+def check_address(address: str) -> None:
+    """Refuse what cannot be the address of a scheduler.
+
+    Raises:
+        RangeError: It is not like tcp://host:8786.
+    """
+    if not _ADDRESS.fullmatch(address):
+        raise RangeError(
+            f"--dask must be a scheduler's address with its port, such as tcp://host:8786, "
+            f"got {address!r}"
+        )
 
 
 @contextlib.contextmanager

@@ -25,11 +25,17 @@ from limit_surface_ros.files.surface_file import read_surface_model, write_surfa
 from limit_surface_ros.fitting.catalogue import Outcome, outcomes
 from limit_surface_ros.fitting.worker_processes import available_cores, worker_processes
 from limit_surface_ros.surface.convexity import NotConvexWarning
-from limit_surface_ros.tools.executors import CLUSTER_IN_FLIGHT, dask_executor
+from limit_surface_ros.tools.executors import CLUSTER_IN_FLIGHT, check_address, dask_executor
+from limit_surface_ros.tools.given_options import refuse_empty
 from limit_surface_ros.tools.program import FAILED, run_program
 from limit_surface_ros.tools.progress import progress_bar
-from limit_surface_ros.tools.surface_fit import add_fit_options, fit_model
-from limit_surface_ros.tools.training_data import ACCEPTED, SUFFIXES, is_bag
+from limit_surface_ros.tools.surface_fit import (
+    add_fit_options,
+    add_frame_option,
+    check_fit_options,
+    fit_model,
+)
+from limit_surface_ros.tools.training_data import ACCEPTED, SUFFIXES, is_bag, is_bag_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -80,7 +86,8 @@ def parser() -> argparse.ArgumentParser:
         type=Path,
         required=True,
         metavar="FOLDER",
-        help="another folder, made if it is not there; NAME.csv becomes NAME.yaml in it",
+        help="another folder, made if it is not there; NAME.csv becomes NAME.yaml in it, and the "
+        "model's name is the contact's, or NAME",
     )
     top.add_argument("--refit", action="store_true", help="fit also what is finished")
     where = top.add_mutually_exclusive_group()
@@ -97,6 +104,7 @@ def parser() -> argparse.ArgumentParser:
         help="fit on the Dask cluster with this scheduler, such as tcp://host:8786; its workers "
         "need this package and the folder under the same path (extra: cluster)",
     )
+    add_frame_option(top)
     add_fit_options(top)
     return top
 
@@ -142,7 +150,7 @@ def fit_settings(options: argparse.Namespace) -> str:
 def is_input(path: Path) -> bool:
     """Tell whether something in the folder is to be fitted."""
     if path.is_dir():
-        return (path / "metadata.yaml").is_file()
+        return is_bag_folder(path)
     return path.suffix.lower() in SUFFIXES or is_bag(path)
 
 
@@ -176,7 +184,7 @@ def is_finished(item: CatalogueObject) -> bool:
 
 def fit_object(options: argparse.Namespace, item: CatalogueObject) -> SurfaceModel:
     """Fit one object, in whatever process this runs."""
-    model = fit_model(item.source, item.source.stem, options).model
+    model = fit_model(item.source, None, options, item.source.stem).model
     return replace(model, fit={**model.fit, MADE_FROM: item.made_from})
 
 
@@ -225,6 +233,10 @@ def report(failures: Iterable[Outcome[CatalogueObject]]) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Fit what is not finished, and report."""
+    refuse_empty(options, ["frame_id"])
+    check_fit_options(options)
+    if options.dask is not None:
+        check_address(options.dask)
     every = objects(options)
     try:
         options.output.mkdir(parents=True, exist_ok=True)

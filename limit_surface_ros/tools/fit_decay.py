@@ -23,10 +23,10 @@ from limit_surface_ros.decay.fit import METHODS, Options, fit_decay
 from limit_surface_ros.decay.response_fits import largest_error
 from limit_surface_ros.decay.smoothing import resting_level
 from limit_surface_ros.decay.targets import Record
-from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.decay_file import DecayModel, write_decay_model
 from limit_surface_ros.tools.decay_input import add_input_options, read_input
-from limit_surface_ros.tools.given_options import model_name, refuse_unused
+from limit_surface_ros.tools.given_options import refuse_empty, refuse_unused
+from limit_surface_ros.tools.output_file import MODEL_SUFFIXES, check_output
 from limit_surface_ros.tools.program import run_program
 from limit_surface_ros.tools.training_data import is_bag
 
@@ -261,9 +261,8 @@ def refuse_options_of_others(options: argparse.Namespace) -> None:
 def run(options: argparse.Namespace) -> None:
     """Read, fit, write, report."""
     if options.output is not None:
-        name = model_name(options.output, options.name)
-        if not options.output.parent.is_dir():
-            raise RangeError(f"{options.output}: its folder does not exist")
+        check_output(options.output, MODEL_SUFFIXES, [Path(options.input)])
+    refuse_empty(options, ["name"])
     refuse_options_of_others(options)
     chosen = method_options(options)
     given = read_input(options)
@@ -279,7 +278,9 @@ def run(options: argparse.Namespace) -> None:
     )
     end_progress()
     # Before the report: a sum that is no decay model, and so not written, is told first.
-    model = None if options.output is None else model_of(result, given, name)
+    model = None
+    if options.output is not None:
+        model = model_of(result, given, options.name or options.output.stem)
     report(result, given)
     for doubt in doubts(result, given):
         print(f"fit_decay: warning: {doubt}", file=sys.stderr)

@@ -11,25 +11,29 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limit_surface_ros.checks import counted
 from limit_surface_ros.files.bag_pushes import Selection
 from limit_surface_ros.files.surface_file import write_surface_model
-from limit_surface_ros.fitting.multi_start import process_pool
+from limit_surface_ros.fitting.multi_start import AGREEMENT, process_pool
 from limit_surface_ros.fitting.worker_processes import available_cores
-from limit_surface_ros.tools.given_options import model_name, refuse_unused
+from limit_surface_ros.tools.given_options import named_path, refuse_empty, refuse_unused
+from limit_surface_ros.tools.output_file import MODEL_SUFFIXES, check_output
 from limit_surface_ros.tools.program import run_program
 from limit_surface_ros.tools.progress import progress_bar
 from limit_surface_ros.tools.surface_fit import (
     WITHOUT_MOTIONS,
     add_fit_options,
+    add_frame_option,
+    check_fit_options,
     fit_model,
     objective_of,
 )
-from limit_surface_ros.tools.training_data import ACCEPTED, is_bag
+from limit_surface_ros.tools.training_data import ACCEPTED, CONTACT_SUFFIXES, check_input, is_bag
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from limit_surface_ros.fitting.result import Errors
+    from limit_surface_ros.fitting.result import Errors, FitResult
     from limit_surface_ros.tools.surface_fit import FittedModel
 
 EXAMPLES = """examples:
@@ -45,6 +49,10 @@ CHOSEN_BY_AUTO = ("kind", "terms", "family", "objective", "velocity_weight", "st
 OF_BAGS = ("wrench_topic", "motion_topic", *asdict(Selection()))
 
 
+# Costs closer than this differ by rounding.
+NO_COST = 1e-12
+
+
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     top = argparse.ArgumentParser(
@@ -53,11 +61,14 @@ def parser() -> argparse.ArgumentParser:
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    top.add_argument("input", type=Path, help=ACCEPTED)
+    top.add_argument("input", type=named_path, help=ACCEPTED)
     top.add_argument(
         "-o", "--output", type=Path, required=True, help="model file to write (.yaml)"
     )
-    top.add_argument("--name", help="the model's name; default: that of the output file")
+    top.add_argument(
+        "--name", help="the model's name; default: the contact's, or that of the output file"
+    )
+    add_frame_option(top)
     top.add_argument(
         "--workers",
         type=int,
@@ -77,7 +88,7 @@ def report(fitted: FittedModel, output: Path) -> None:
     state = "converged" if result.converged else "not converged"
     print(f"objective   {result.objective}")
     print(f"cost        {result.cost:.6g}, {state} after {result.iterations} steps")
-    print(f"starts      {', '.join(f'{cost:.6g}' for cost in result.start_costs)}")
+    print(f"starts      {starts_in_words(result)}")
     print_errors("training", result.training)
     if result.held_out is not None:
         print_errors("held out", result.held_out)
@@ -85,11 +96,28 @@ def report(fitted: FittedModel, output: Path) -> None:
     print(f"written     {output}")
 
 
+def starts_in_words(result: FitResult) -> str:
+    """Tell how many starts led to the best cost, and what the next best was."""
+    costs, best = result.start_costs, result.start_costs[0]
+    others = [cost for cost in costs if cost > best * (1.0 + AGREEMENT) + NO_COST]
+    told = f"{len(costs) - len(others)} of {counted(len(costs), 'start')} agree"
+    if others:
+        told += f", the next best cost {min(others):.6g}"
+    if result.cost > result.details.get("projected_cost", result.cost):
+        # Of the second approximation alone, whose starts leave a matrix free to be indefinite.
+        told += (
+            f"; their best cost {best:.6g} is of a surface that is not closed, the cost above of "
+            "the model, which is closed: --terms 2 without --objective second may fit better"
+        )
+    return told
+
+
 def print_errors(label: str, errors: Errors) -> None:
     """Print one line of errors."""
     median, most, worst = errors.velocity
     print(
-        f"{label:<11} {errors.pairs} pairs: mean angle {np.degrees(errors.mean_angle):.2f} deg, "
+        f"{label:<11} {counted(errors.pairs, 'pair')}: mean angle "
+        f"{np.degrees(errors.mean_angle):.2f} deg, "
         f"velocity error {median:.3f} / {most:.3f} / {worst:.3f} (50 / 95 / 100 %)"
     )
 
@@ -98,10 +126,11 @@ def refuse_options_of_others(options: argparse.Namespace) -> None:
     """Refuse what is for another kind of input or of fit than the one asked for.
 
     Raises:
+        FileError: There is no such input.
         RangeError: An option would do nothing.
     """
-    top, suffix = parser(), options.input.suffix.lower()
-    if suffix not in (".yaml", ".yml"):
+    top, suffix = parser(), check_input(options.input)
+    if suffix not in CONTACT_SUFFIXES:
         refuse_unused(top, options, OF_CONTACTS, "for a contact file")
     if suffix != ".csv":
         refuse_unused(top, options, ["rows"], "for a CSV of pushes")
@@ -115,18 +144,25 @@ def refuse_options_of_others(options: argparse.Namespace) -> None:
             refuse_unused(top, options, ["family"], "for --kind power_sum")
         if options.kind == "polynomial":
             refuse_unused(top, options, ["terms"], "not for --kind polynomial")
-        objective = objective_of(options, recorded=suffix not in (".yaml", ".yml"))
+        objective = objective_of(options, recorded=suffix not in CONTACT_SUFFIXES)
+        if objective == "second":
+            of_others = "not for --objective second, which has two terms of its own"
+            refuse_unused(top, options, ["terms", "family"], of_others)
         if objective in WITHOUT_MOTIONS:
             refuse_unused(top, options, ["velocity_weight"], f"not for the objective {objective}")
 
 
 def run(options: argparse.Namespace) -> None:
     """Read, fit, write, report."""
-    name = model_name(options.output, options.name)
+    check_output(options.output, MODEL_SUFFIXES, [options.input])
+    refuse_empty(options, ["name", "frame_id"])
+    check_fit_options(options)
     refuse_options_of_others(options)
     parts = "fits" if options.auto else "starts"
     with process_pool(options.workers) as executor, progress_bar(parts) as progress:
-        fitted = fit_model(options.input, name, options, executor, progress)
+        fitted = fit_model(
+            options.input, options.name, options, options.output.stem, executor, progress
+        )
     command = shlex.join(["fit_surface", *options.command])
     write_surface_model(fitted.model, options.output, header=f"Made by: {command}")
     report(fitted, options.output)

@@ -1,17 +1,15 @@
-"""Checks of a command line that argparse does not make: options that would do nothing."""
+"""Checks of a command line that argparse does not make: numbers, and options without effect."""
 
 from __future__ import annotations
 
+import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from limit_surface_ros.errors import RangeError
 
 if TYPE_CHECKING:
-    import argparse
-    from collections.abc import Iterable
-    from pathlib import Path
-
-MODEL_SUFFIXES = (".yaml", ".yml")
+    from collections.abc import Iterable, Mapping
 
 
 def refuse_unused(
@@ -33,17 +31,49 @@ def refuse_unused(
     """
     for name in names:
         if getattr(options, name) != parser.get_default(name):
-            raise RangeError(f"--{name.replace('_', '-')} does nothing here: it is {belongs_to}")
+            raise RangeError(f"{flag(name)} does nothing here: it is {belongs_to}")
 
 
-def model_name(output: Path, name: str | None) -> str:
-    """Return the name of the model that a program writes, by default that of its file.
+def refuse_empty(options: argparse.Namespace, names: Iterable[str]) -> None:
+    """Refuse texts that were given and are empty.
 
     Raises:
-        RangeError: The file is not to be YAML, or the name is empty.
+        RangeError: One of them is.
     """
-    if output.suffix.lower() not in MODEL_SUFFIXES:
-        raise RangeError(f"{output}: a model file must end in {' or '.join(MODEL_SUFFIXES)}")
-    if name is not None and not name.strip():
-        raise RangeError("--name must not be empty")
-    return output.stem if name is None else name
+    for name in names:
+        value = getattr(options, name)
+        if value is not None and not value.strip():
+            raise RangeError(f"{flag(name)} must not be empty")
+
+
+def check_ranges(options: argparse.Namespace, ranges: Mapping[str, tuple[float, float]]) -> None:
+    """Refuse numbers that are out of their ranges; None, which is not given, is in all of them.
+
+    Args:
+        options: What the parser read.
+        ranges: The least and the largest that each option takes, by its attribute.
+
+    Raises:
+        RangeError: One of them is out of its range, or no number.
+    """
+    for name, (least, most) in ranges.items():
+        value = getattr(options, name)
+        # NaN fails this.
+        if value is not None and not least <= value <= most:
+            raise RangeError(f"{flag(name)} must be from {least:.7g} to {most:.7g}, got {value}")
+
+
+def named_path(text: str) -> Path:
+    """Return a path that is given on the command line.
+
+    Raises:
+        ArgumentTypeError: It is empty, which would stand for the present folder.
+    """
+    if not text:
+        raise argparse.ArgumentTypeError("an empty name is no file")
+    return Path(text)
+
+
+def flag(name: str) -> str:
+    """Return an option as it is typed, of its attribute."""
+    return f"--{name.replace('_', '-')}"

@@ -7,14 +7,14 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from limit_surface_ros.checks import as_positive
 from limit_surface_ros.decay.examples import EXAMPLES, example
 from limit_surface_ros.errors import FileError
 from limit_surface_ros.files.decay_file import read_decay_model
 from limit_surface_ros.files.response_csv import read_response
-from limit_surface_ros.plots.canvas import DPI, SUFFIXES, save_figure
+from limit_surface_ros.plots.canvas import save_figure
 from limit_surface_ros.plots.decay_view import PROJECTION, draw_decay
 from limit_surface_ros.tools.decay_input import after, without
+from limit_surface_ros.tools.picture_options import add_picture_options, check_picture
 from limit_surface_ros.tools.program import run_program
 
 if TYPE_CHECKING:
@@ -43,16 +43,7 @@ def parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     top.add_argument("model", type=Path, metavar="MODEL", help="model file (.yaml)")
-    top.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        default=Path("decay.png"),
-        help=f"picture to write: {', '.join(SUFFIXES)} (%(default)s)",
-    )
-    top.add_argument(
-        "--dpi", type=float, default=DPI, help="dots to the inch of a PNG (%(default)g)"
-    )
+    add_picture_options(top, "decay.png")
     top.add_argument(
         "--response",
         metavar="X",
@@ -92,9 +83,10 @@ def _stated(model: DecayModel, key: str) -> float:
 
 def run(options: argparse.Namespace) -> None:
     """Read, draw, write."""
+    check_picture(options, map(Path, filter(None, [options.model, options.response])))
     model = read_decay_model(options.model)
     figure = draw_decay(model, response_of(model, options))
-    save_figure(figure, options.output, as_positive("--dpi", options.dpi))
+    save_figure(figure, options.output, options.dpi)
     print(f"written     {options.output}")
 
 

@@ -9,15 +9,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.checks import as_positive
 from limit_surface_ros.errors import DataError
 from limit_surface_ros.files.contact_file import read_contact
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.files.surface_file import read_surface_model
-from limit_surface_ros.plots.canvas import DPI, SUFFIXES, save_figure
+from limit_surface_ros.plots.canvas import save_figure
 from limit_surface_ros.plots.surface_view import draw_surfaces
 from limit_surface_ros.surface.sampling import facet_loads, random_motions
+from limit_surface_ros.tools.picture_options import add_picture_options, check_picture
 from limit_surface_ros.tools.program import run_program
+from limit_surface_ros.tools.same_point import About, require_one_point
+from limit_surface_ros.tools.training_data import CONTACT_SUFFIXES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,16 +52,7 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument(
         "models", nargs="+", type=Path, metavar="MODEL", help="model files (.yaml), up to four"
     )
-    top.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        default=Path("surface.png"),
-        help=f"picture to write: {', '.join(SUFFIXES)} (%(default)s)",
-    )
-    top.add_argument(
-        "--dpi", type=float, default=DPI, help="dots to the inch of a PNG (%(default)g)"
-    )
+    add_picture_options(top, "surface.png")
     top.add_argument(
         "--data",
         type=Path,
@@ -69,31 +62,42 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
-def loads_of(path: Path) -> Floats:
-    """Return the loads that data give, shape (n, 3): recorded ones, or those of a contact.
+def loads_of(path: Path) -> tuple[Floats, About | None]:
+    """Return the loads that data give: recorded ones, or those of a contact.
+
+    Returns:
+        Shape (n, 3), and what they are about, which recorded pushes do not state.
 
     Raises:
         FileError: The file is no valid one of its suffix.
     """
-    if path.suffix.lower() not in (".yaml", ".yml"):
-        return read_pushes(path).pairs.wrenches
-    surface = read_contact(path).surface
-    loads = [random_motions(surface, MOTIONS, 0).wrenches]
-    if len(surface.points) <= FEW_POINTS:
-        loads.append(facet_loads(surface, FACET_LOADS, 0).wrenches)
-    return np.vstack(loads)
+    if path.suffix.lower() not in CONTACT_SUFFIXES:
+        return read_pushes(path).pairs.wrenches, None
+    contact = read_contact(path)
+    loads = [random_motions(contact.surface, MOTIONS, 0).wrenches]
+    if len(contact.surface.points) <= FEW_POINTS:
+        loads.append(facet_loads(contact.surface, FACET_LOADS, 0).wrenches)
+    return np.vstack(loads), About(path, contact.frame_id, contact.reference_point.tolist())
 
 
 def run(options: argparse.Namespace) -> None:
     """Read, draw, write."""
+    data = [] if options.data is None else [options.data]
+    check_picture(options, [*options.models, *data])
     surfaces: dict[str, LimitSurface] = {}
+    stated: list[About] = []
     for path in options.models:
         model = read_surface_model(path)
         if model.name in surfaces:
             raise DataError(f"{path}: another file holds a model named {model.name!r}, too")
         surfaces[model.name] = model.surface
-    loads = None if options.data is None else loads_of(options.data)
-    save_figure(draw_surfaces(surfaces, loads), options.output, as_positive("--dpi", options.dpi))
+        stated.append(About(path, model.frame_id, model.reference_point))
+    loads = None
+    if options.data is not None:
+        loads, about = loads_of(options.data)
+        stated += [about] if about is not None else []
+    require_one_point(stated)
+    save_figure(draw_surfaces(surfaces, loads), options.output, options.dpi)
     print(f"written     {options.output}")
 
 

@@ -1,16 +1,19 @@
-"""What the command line programs share: errors as one line, interrupts without a traceback."""
+"""What the command line programs share: errors and warnings as one line, quiet interrupts."""
 
 from __future__ import annotations
 
 import os
 import sys
+import warnings
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from limit_surface_ros.errors import LimitSurfaceError
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
+    from typing import TextIO
 
 FAILED = 1
 USAGE_ERROR = 2
@@ -38,7 +41,8 @@ def run_program(
     """
     arguments = parser.parse_args(argv)
     try:
-        code = run(arguments)
+        with _plain_warnings(parser.prog):
+            code = run(arguments)
         sys.stdout.flush()
     except LimitSurfaceError as error:
         print(f"{parser.prog}: error: {error}", file=sys.stderr)
@@ -54,6 +58,29 @@ def run_program(
         print(f"{parser.prog}: error: {error}", file=sys.stderr)
         return FAILED
     return code or 0
+
+
+@contextmanager
+def _plain_warnings(program: str) -> Iterator[None]:
+    """Print warnings as one line each inside the block, without the place in the code."""
+
+    def show(
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
+        print(f"{program}: warning: {message}", file=sys.stderr)
+
+    # Tests and libraries get warnings as they asked for them again after the block.
+    before = warnings.showwarning
+    warnings.showwarning = show
+    try:
+        yield
+    finally:
+        warnings.showwarning = before
 
 
 def _give_up_unwritten_output() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from limit_surface_ros import __version__
 from limit_surface_ros.errors import DataError, RangeError
 from limit_surface_ros.files.bag_pushes import Selection
-from limit_surface_ros.files.surface_file import SurfaceModel
+from limit_surface_ros.files.surface_file import LARGEST_SCALE, SurfaceModel
 from limit_surface_ros.fitting.automatic import fit_automatically
 from limit_surface_ros.fitting.dissipation import FITTED_ON, fit_dissipation
 from limit_surface_ros.fitting.multi_start import Search
@@ -20,12 +20,13 @@ from limit_surface_ros.fitting.power_sum import fit_power_sum
 from limit_surface_ros.fitting.scaled_pairs import scaling_of_pairs
 from limit_surface_ros.fitting.second_approximation import fit_second_approximation
 from limit_surface_ros.surface.power_sum import thesis_exponents
+from limit_surface_ros.tools.given_options import check_ranges
 from limit_surface_ros.tools.training_data import (
-    ACCEPTED,
+    CONTACT_SUFFIXES,
     Simulation,
     check_input,
+    check_scaling,
     is_bag,
-    row_numbers,
     training_data_of_bag,
     training_data_of_contact,
     training_data_of_pushes,
@@ -44,6 +45,22 @@ if TYPE_CHECKING:
     from limit_surface_ros.tools.training_data import TrainingData
 
 
+# What numbers the fit takes: the upper ends keep a slip of the keyboard from filling the memory.
+RANGES = {
+    "seed": (0, 2**63 - 1),
+    "motions": (1, 1_000_000),
+    "facet_loads": (0, 100_000),
+    "load_noise": (0.0, 1e6),
+    "motion_noise": (0.0, 1e6),
+    "characteristic_length": (1.0 / LARGEST_SCALE, LARGEST_SCALE),
+    "terms": (1, 1000),
+    "velocity_weight": (0.0, 1e12),
+    "starts": (1, 1_000_000),
+    "folds": (2, 1000),
+    "bootstrap": (0, 100_000),
+}
+# Frame of a model whose data state none.
+DEFAULT_FRAME = "object"
 # Objectives that look at loads alone.
 WITHOUT_MOTIONS = ("J1", "forces", "least-squares")
 # What each kind can be fitted by, the default first.
@@ -64,7 +81,6 @@ class FittedModel:
 
 def add_fit_options(parser: argparse.ArgumentParser) -> None:
     """Declare every option on which the fitted model depends, but for its name."""
-    parser.add_argument("--frame-id", default="object", help="the model's frame (%(default)s)")
     _add_data_options(parser.add_argument_group("data"))
     _add_bag_options(parser.add_argument_group("bags: what counts as a quasi-static push"))
 
@@ -135,6 +151,13 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_frame_option(parser: argparse.ArgumentParser) -> None:
+    """Declare the frame of the models that a program writes."""
+    parser.add_argument(
+        "--frame-id", help=f"the model's frame; default: the contact's, or {DEFAULT_FRAME}"
+    )
+
+
 def _add_data_options(data: argparse._ArgumentGroup) -> None:
     data.add_argument(
         "--rows", help="rows of a CSV to fit, such as 0,3,10-14; others are held out"
@@ -191,19 +214,30 @@ def _add_bag_options(bags: argparse._ArgumentGroup) -> None:
         )
 
 
+def check_fit_options(options: argparse.Namespace) -> None:
+    """Refuse numbers that no fit takes, before there is any work.
+
+    Raises:
+        RangeError: One of them is out of its range; the message names the option.
+    """
+    check_ranges(options, RANGES)
+
+
 def fit_model(
     path: Path,
-    name: str,
+    name: str | None,
     options: argparse.Namespace,
+    default_name: str,
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> FittedModel:
     """Read an input and fit what the options ask for.
 
     Args:
-        path: A contact file or recorded pushes.
-        name: The model's name.
-        options: What `add_fit_options` declares.
+        path: A contact file, recorded pushes or a bag.
+        name: The model's name; that of the contact if not given.
+        options: What `add_fit_options` and `add_frame_option` declare.
+        default_name: The model's name where the input states none either.
         executor: Where starts run; here and one by one if not given.
         progress: Called with (starts done, starts at most) after each.
 
@@ -211,12 +245,16 @@ def fit_model(
         FileError: The input is absent or not valid.
         LimitSurfaceError: The data cannot support the fit, or an option is out of range.
     """
-    data = read_input(path, options)
-    result = fit(options, data, Search(options.starts, options.seed, executor, progress))
+    try:
+        data = read_input(path, options)
+        result = fit(options, data, Search(options.starts, options.seed, executor, progress))
+    except DataError as error:
+        named = str(error).startswith(f"{path}: ")
+        raise error if named else DataError(f"{path}: {error}") from None
     model = SurfaceModel(
-        name=name,
+        name=name or data.name or default_name,
         surface=result.surface,
-        frame_id=options.frame_id,
+        frame_id=options.frame_id or data.frame_id or DEFAULT_FRAME,
         reference_point=data.reference_point,
         normal_force=data.normal_force,
         fit=history(options, data, result),
@@ -225,12 +263,19 @@ def fit_model(
 
 
 def read_input(path: Path, options: argparse.Namespace) -> TrainingData:
-    """Read or make the pairs that the input stands for."""
+    """Read or make the pairs that the input stands for.
+
+    Raises:
+        FileError: The input is absent or not valid.
+        DataError: It has not the rows or topics that the options ask for.
+    """
     suffix = check_input(path)
-    rows = None if options.rows is None else row_numbers(options.rows)
-    if suffix == ".csv":
-        return training_data_of_pushes(path, rows)
-    if suffix in (".yaml", ".yml"):
+    if is_bag(path):
+        rules = {rule: getattr(options, rule) for rule in asdict(Selection())}
+        return training_data_of_bag(
+            path, options.wrench_topic, options.motion_topic, Selection(**rules)
+        )
+    if suffix in CONTACT_SUFFIXES:
         simulation = Simulation(
             options.motions,
             options.facet_loads,
@@ -239,12 +284,7 @@ def read_input(path: Path, options: argparse.Namespace) -> TrainingData:
             options.seed,
         )
         return training_data_of_contact(path, simulation, options.characteristic_length)
-    if is_bag(path):
-        rules = {rule: getattr(options, rule) for rule in asdict(Selection())}
-        return training_data_of_bag(
-            path, options.wrench_topic, options.motion_topic, Selection(**rules)
-        )
-    raise RangeError(f"{path}: {suffix or 'no suffix'} is not known; accepted is {ACCEPTED}")
+    return training_data_of_pushes(path, options.rows)
 
 
 def fit(options: argparse.Namespace, data: TrainingData, search: Search) -> FitResult:
@@ -253,6 +293,7 @@ def fit(options: argparse.Namespace, data: TrainingData, search: Search) -> FitR
     if length is None:
         length = data.characteristic_length
     scaling = scaling_of_pairs(data.training, length)
+    check_scaling(scaling)
     if options.auto:
         result = fit_automatically(
             data.training,
@@ -334,7 +375,11 @@ def exponents_of(options: argparse.Namespace) -> Floats:
 def support_of(options: argparse.Namespace, data: TrainingData) -> PointContacts | None:
     """Return the support points that a prior is made of, if the options ask for one."""
     if options.support and data.support is None:
-        raise DataError("--support: the input states no support points with their loads")
+        raise DataError(
+            "--support: the input states no support points with their loads; a CSV states them in "
+            'a first line # {"support_points_m_body_frame": [[x, y], ...], '
+            '"support_loads_N": [load, ...]}'
+        )
     return data.support if options.support else None
 
 

@@ -10,6 +10,7 @@ from limit_surface_ros.errors import DataError, FileError
 from limit_surface_ros.files.bag_pushes import Selection, read_bag_pushes
 from limit_surface_ros.files.contact_file import read_contact
 from limit_surface_ros.files.pushes_csv import read_pushes
+from limit_surface_ros.files.surface_file import LARGEST_SCALE
 from limit_surface_ros.fitting.simulation import simulated_pairs
 from limit_surface_ros.surface.point_contacts import PointContacts
 from limit_surface_ros.surface.sampling import random_motions
@@ -20,7 +21,9 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.surface.pairs import Pairs
 
-SUFFIXES = (".yaml", ".yml", ".csv")
+CONTACT_SUFFIXES = (".yaml", ".yml")
+SUFFIXES = (*CONTACT_SUFFIXES, ".csv")
+BAG_SUFFIXES = (".mcap", ".db3")
 ACCEPTED = "a contact file (.yaml, .yml), recorded pushes (.csv), or a ROS 2 bag"
 
 
@@ -34,6 +37,8 @@ class TrainingData:
         characteristic_length: [m], if the source states it.
         support: Support points that the source states, if it does.
         normal_force: [N], if the source states it.
+        name: What the source calls the body, if it does.
+        frame_id: Frame of the pairs, if the source states it.
         reference_point: Of the contact that was simulated [m].
         recorded: Whether the pairs were measured and not simulated.
         about: For the model file.
@@ -44,35 +49,54 @@ class TrainingData:
     characteristic_length: float | None = None
     support: PointContacts | None = None
     normal_force: float | None = None
+    name: str | None = None
+    frame_id: str | None = None
     reference_point: tuple[float, float] = (0.0, 0.0)
     recorded: bool = False
     about: Mapping[str, Any] = field(default_factory=dict)
 
 
-def row_numbers(text: str) -> list[int]:
+def row_numbers(text: str, count: int) -> list[int]:
     """Read row numbers and ranges, such as "0,3,10-14".
 
+    Args:
+        text: What --rows says.
+        count: How many rows there are.
+
     Raises:
-        DataError: The text is no such list, or names a row twice.
+        DataError: The text is no such list, or names a row twice or one that is not there.
     """
     numbers: list[int] = []
     for part in text.split(","):
         first, dash, last = part.strip().partition("-")
         try:
-            numbers.extend(range(int(first), int(last if dash else first) + 1))
+            span = range(int(first), int(last if dash else first) + 1)
         except ValueError:
-            raise DataError(f"rows must be like 0,3,10-14; got {text!r}") from None
+            raise DataError(f"--rows must be like 0,3,10-14; got {text!r}") from None
+        # Before there is a list, which could be of any length.
+        if span and span[-1] >= count:
+            raise DataError(f"--rows: there is no row {span[-1]}; rows are 0 to {count - 1}")
+        numbers.extend(span)
     if len(set(numbers)) != len(numbers) or not numbers:
-        raise DataError(f"rows must name at least one row, and each once; got {text!r}")
+        raise DataError(f"--rows must name at least one row, and each once; got {text!r}")
     return numbers
 
 
-def training_data_of_pushes(path: Path, rows: list[int] | None) -> TrainingData:
+def training_data_of_pushes(path: Path, selected: str | None) -> TrainingData:
     """Read recorded pushes; the rows that are not selected are held out.
 
     The first line's `rho_m` [m] gives the characteristic length where it stands.
+
+    Args:
+        path: The CSV.
+        selected: Its rows to fit, see `row_numbers`; all if not given.
+
+    Raises:
+        FileError: The file is absent or not valid.
+        DataError: There are no such rows.
     """
     pushes = read_pushes(path)
+    rows = None if selected is None else row_numbers(selected, len(pushes.pairs))
     training = pushes.pairs if rows is None else pushes.rows(rows)
     others = len(pushes.pairs) - len(training)
     support = pushes.support()
@@ -111,7 +135,7 @@ def training_data_of_bag(
 
 def is_bag(path: Path) -> bool:
     """Tell whether a path is a ROS 2 bag: a folder, or a file of one of the storages."""
-    return path.is_dir() or path.suffix.lower() in (".mcap", ".db3")
+    return path.is_dir() or path.suffix.lower() in BAG_SUFFIXES
 
 
 @dataclass(frozen=True)
@@ -128,12 +152,18 @@ class Simulation:
 def training_data_of_contact(
     path: Path, simulation: Simulation, characteristic_length: float | None
 ) -> TrainingData:
-    """Make pairs from a contact file, and as many fresh motions without noise to test on."""
+    """Make pairs from a contact file, and as many fresh motions without noise to test on.
+
+    Raises:
+        FileError: The file is absent or no valid contact.
+        DataError: The body is of no size that a model file takes.
+    """
     contact = read_contact(path)
     exact = contact.surface
     if characteristic_length is not None:
         scaling = Scaling(characteristic_length, exact.scaling.friction_force)
         exact = PointContacts(exact.points, exact.friction_limits, scaling)
+    check_scaling(exact.scaling)
     training = simulated_pairs(
         exact,
         simulation.motions,
@@ -149,17 +179,55 @@ def training_data_of_contact(
         characteristic_length=exact.scaling.characteristic_length,
         support=exact,
         normal_force=contact.normal_force,
+        name=contact.name,
+        frame_id=contact.frame_id,
         reference_point=(x, y),
         about={"data": path.name, **asdict(simulation)},
     )
 
 
-def check_input(path: Path) -> str:
-    """Return the suffix of an input that exists.
+def check_scaling(scaling: Scaling) -> None:
+    """Refuse data of a size that no model file takes, before they are fitted.
 
     Raises:
-        FileError: There is no such file.
+        DataError: A scale is out of the range that `surface_file` reads.
     """
-    if not path.exists():
-        raise FileError(f"{path}: there is no such file; accepted is {ACCEPTED}")
-    return path.suffix.lower()
+    scales = {
+        "a characteristic length [m]": scaling.characteristic_length,
+        "a friction force [N]": scaling.friction_force,
+    }
+    for what, scale in scales.items():
+        if not 1.0 / LARGEST_SCALE <= scale <= LARGEST_SCALE:
+            raise DataError(
+                f"the data make {what} of {scale:.3g}; models take {1.0 / LARGEST_SCALE:g} to "
+                f"{LARGEST_SCALE:g}: are the units metres and newtons?"
+            )
+
+
+def check_input(path: Path) -> str:
+    """Return the suffix of an input of a kind that is read, in small letters.
+
+    Raises:
+        FileError: There is no such file, or it is of no such kind.
+    """
+    try:
+        path.stat()
+    except FileNotFoundError:
+        raise FileError(f"{path}: there is no such file; accepted is {ACCEPTED}") from None
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read: {error.strerror or error}") from None
+    suffix = path.suffix.lower()
+    if path.is_dir():
+        if not is_bag_folder(path):
+            raise FileError(
+                f"{path}: is a folder without a metadata.yaml, so no bag; accepted is {ACCEPTED}"
+            )
+    elif suffix not in (*SUFFIXES, *BAG_SUFFIXES):
+        found = f"files that end in {suffix} are" if suffix else "a file without a suffix is"
+        raise FileError(f"{path}: {found} not known; accepted is {ACCEPTED}")
+    return suffix
+
+
+def is_bag_folder(path: Path) -> bool:
+    """Tell whether a folder is a ROS 2 bag."""
+    return (path / "metadata.yaml").is_file()

@@ -68,7 +68,19 @@ def test_every_pressure_is_read(tmp_path, pressure):
     ("text", "message"),
     [
         (PATCH, "either `points` or a `shape`"),
-        (POINTS, "friction_limits: missing"),
+        (POINTS, "friction_limits: missing; it must be an array of 3 numbers"),
+        (POINTS + "friction_limits: [1, -1, 1]\n", r"friction_limits\[1\]: must be at least 0"),
+        (POINTS.replace("0.3]", "1.0e+101]"), r"points\[2\]\[1\]: must be at most 1e\+100"),
+        (
+            POINTS + "reference_point: centre\n",
+            r"reference_point: must be centroid, or \[x, y\] in metres, got 'centre'",
+        ),
+        ("kind: dissipation\n" + POINTS, "kind: this is a surface model: plot_surface draws it"),
+        ("kind: exponential_sum\nrates: [[-1, 0]]\n", "this is a decay model: plot_decay draws"),
+        (
+            PATCH.replace("200", "100000000") + "shape: {kind: disc, radius: 1}\n",
+            "cells: must be a whole number from 1 to 1000000, got 100000000",
+        ),
         (POINTS + "friction_limits: [1, 2]\n", "friction_limits: must be an array of 3"),
         (POINTS + "friction_limits: [0, 0, 0]\n", "friction_limits: .* above 0"),
         (

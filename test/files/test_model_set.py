@@ -42,10 +42,18 @@ def test_of_thousands_of_models_a_message_lists_a_few():
 
 
 def test_two_models_of_one_name_and_no_model_at_all_are_refused():
-    with pytest.raises(FileError, match="two model files hold a model named 'a'"):
+    with pytest.raises(FileError, match="two models are named 'a'"):
         ModelSet([Named("a"), Named("a")])
     with pytest.raises(FileError, match="no model file is given"):
         ModelSet([])
+
+
+def test_two_files_with_models_of_one_name_are_both_named(tmp_path):
+    paths = [tmp_path / name for name in ("one.yaml", "two.yaml")]
+    for path in paths:
+        path.touch()
+    with pytest.raises(FileError, match=r"two\.yaml: holds a model named 'same', as .*one\.yaml"):
+        read_model_set(paths, lambda path: Named("same"))
 
 
 def test_a_folder_stands_for_its_yaml_files_in_the_order_of_their_names(tmp_path):
@@ -60,12 +68,14 @@ def test_one_bad_file_or_entry_refuses_the_whole_set(tmp_path):
     good.touch()
     bad.touch()
     (tmp_path / "empty").mkdir()
+    (tmp_path / "loop.yaml").symlink_to("loop.yaml")
     assert len(read_model_set([good], read)) == 1
     for entries, message in (
         ([good, bad], "bad.yaml: bad"),
         ([good, tmp_path / "absent.yaml"], "absent.yaml: no such file or folder"),
         ([good, tmp_path / "empty"], "the folder holds no"),
         ([good, ""], "an entry of the model files is empty"),
+        ([good, tmp_path / "loop.yaml"], "loop.yaml: cannot be read: Too many levels"),
         ([good, "x" * 300], "cannot be read: .*File name too long"),
         ([good, "nul\0.yaml"], "cannot be read|no such file"),
     ):

@@ -66,6 +66,11 @@ def test_rows_are_selected_and_the_rest_held_out(tmp_path):
             "line 3: column tau_Nm: must be finite, got nan",
         ),
         (NAMES + "1,2,3\n", "line 2: has 3 cells, the columns are 6"),
+        (NAMES + "1;2;3;4;5;6\n", "the columns are 6; columns are separated by commas"),
+        (NAMES.replace(",", ";") + ROW, "line 1: .* columns are separated by commas"),
+        (NAMES.replace(",", "\t") + ROW, "line 1: .* columns are separated by commas"),
+        (NAMES + ROW + "1e300,1,1,1,1,1\n", r"line 3: column fx_N: must be at most 1e\+100"),
+        (NAMES + "1,1,1,0,1e-120,0\n", "line 2: the twist is below 1e-100 in size"),
         (NAMES + "0,0,0,1,1,1\n", "line 2: the wrench is zero"),
         (NAMES + "1,1,1,0,0,0\n", "line 2: the twist is zero"),
         (NAMES + ROW + "1" * 200_000 + "\n", "line 3: is not a row of CSV: field larger"),
@@ -80,7 +85,7 @@ def test_faults_are_named_with_file_and_line(tmp_path, text, message):
 
 def test_a_first_line_of_wrong_values_is_refused(tmp_path):
     pushes = read_pushes(written(tmp_path, HEADER.replace("0.05", '"x"') + NAMES + ROW))
-    with pytest.raises(FileError, match="rho_m must be a number above 0, got 'x'"):
+    with pytest.raises(FileError, match=r"rho_m must be a number above 0, .*got 'x'"):
         pushes.number("rho_m")
 
 

@@ -66,6 +66,8 @@ def test_a_file_cut_short_anywhere_is_refused(tmp_path, surface):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
+        ("schema: 1\n", "", "schema: missing; it must be one of 1"),
+        ("kind: power_sum", "rates: [[-1.0, 0.0]]", "kind: this is a decay model: plot_decay"),
         ("schema: 1", "schema: 2", "schema: must be one of 1; got 2"),
         ("kind: power_sum", "kind: power", "kind: must be one of power_sum, .*; got 'power'"),
         ("name: part", "", "name: missing"),

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from limit_surface_ros.checks import LARGEST
 from limit_surface_ros.errors import FileError
 from limit_surface_ros.files.yaml_reader import read_yaml, write_atomically, write_yaml
 
@@ -32,8 +33,9 @@ def section_of(tmp_path):
         ("x: [1]", r"x: must be a number, got \[1"),
         ("x: 0.0", "x: must be above 0.0 and at most 2.0, got 0.0"),
         ("x: 3", "x: must be above 0.0 and at most 2.0, got 3.0"),
-        ("y: 1", "x: missing"),
-        ("x: null", "x: missing"),
+        ("y: 1", "x: missing; it must be a number above 0.0 and at most 2.0"),
+        ("x: null", "x: missing; it must be"),
+        (f"x: 1{'0' * 101}", r"x: must be at most 1e\+100 in size"),
         (f"x: 1{'0' * 400}", "x: must be finite"),
     ],
 )
@@ -57,6 +59,25 @@ def test_a_number_that_is_not_acceptable_is_refused_with_its_key(section_of, tex
 def test_an_array_that_is_not_acceptable_is_refused_with_its_place(section_of, text, message):
     with pytest.raises(FileError, match=message):
         section_of(text).array("m", (None, 2))
+
+
+def test_what_is_missing_is_told_with_what_is_accepted(section_of):
+    section = section_of("a: 1")
+    for read, accepted in (
+        (lambda: section.choice("x", ["red", "blue"]), "one of red, blue"),
+        (lambda: section.text("x"), "a text that is not empty"),
+        (lambda: section.integer("x", at_least=1, at_most=9), "a whole number from 1 to 9"),
+        (lambda: section.number("x"), "a number"),
+        (lambda: section.array("x", (None, 2)), "an array of n x 2 numbers"),
+        (lambda: section.section("x"), "a mapping of keys to values"),
+    ):
+        with pytest.raises(FileError, match=f"x: missing; it must be {accepted}$"):
+            read()
+
+
+def test_a_number_of_an_array_below_its_bound_is_named_with_its_place(section_of):
+    with pytest.raises(FileError, match=r"m\[1\]\[0\]: must be at least 0.0, got -3.0$"):
+        section_of("m: [[1, 2], [-3, 4]]").array("m", (2, 2), at_least=0.0)
 
 
 @pytest.mark.parametrize(
@@ -160,9 +181,7 @@ def test_the_place_of_an_error_in_nested_sections_is_named(section_of):
         second.number("x")
 
 
-@given(
-    st.lists(st.floats(allow_nan=False, allow_infinity=False, width=64), min_size=1, max_size=20)
-)
+@given(st.lists(st.floats(min_value=-LARGEST, max_value=LARGEST), min_size=1, max_size=20))
 def test_numbers_written_and_read_back_are_the_same_bit_for_bit(tmp_path_factory, numbers):
     path = tmp_path_factory.mktemp("yaml") / "numbers.yaml"
     write_yaml(path, {"numbers": np.array(numbers)})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -15,9 +16,15 @@ from limit_surface_interfaces.srv import ListModels, WrenchToTwist
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
-from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
+from limit_surface_ros.files.surface_file import (
+    SurfaceModel,
+    read_surface_model,
+    write_surface_model,
+)
+from limit_surface_ros.nodes.model_host import ModelHost
 from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
 from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.polynomial import Polynomial
 from limit_surface_ros.surface.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 from node_helpers import planar_twist, wrench_message
@@ -39,6 +46,24 @@ def twist_now(ask):
     answer = ask(WrenchToTwist.Request(wrench=wrench_message(WRENCH)))
     assert answer.error_code == ErrorCode.NONE, answer.error_msg
     return planar_twist(answer.twist)
+
+
+def test_what_is_to_be_said_of_a_model_goes_into_the_log_in_plain_words(tmp_path):
+    path = tmp_path / "cross.yaml"
+    # x^4 + y^4 + m^4 + 12 x^2 y^2 bends inward.
+    cross = [1, 0, 0, 12, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1]
+    write_surface_model(SurfaceModel("cross", Polynomial(cross)), path)
+
+    class Parameters:
+        def concern(self, names, prepare):
+            prepare(dict(zip(names, ([str(path)], ""), strict=True)))()
+
+    said = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        ModelHost(Parameters(), read_surface_model, said.append)
+    (line,) = said
+    assert line.startswith("limit surface 'cross' is not convex")
 
 
 def test_reload_takes_what_the_files_hold_now(running, model_file):

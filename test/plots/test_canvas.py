@@ -67,3 +67,8 @@ def test_curves_of_one_picture_differ_in_colour_and_in_dashes():
     styles = [line_style(index) for index in range(len(CYCLE))]
     assert len({style["color"] for style in styles}) == len(CYCLE)
     assert len({str(style["linestyle"]) for style in styles}) == len(CYCLE)
+
+
+def test_the_first_forty_nine_curves_look_different():
+    looks = {str(sorted(line_style(index).items())) for index in range(49)}
+    assert len(looks) == 49

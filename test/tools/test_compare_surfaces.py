@@ -7,10 +7,11 @@ import pytest
 
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
 from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.polynomial import Polynomial
 from limit_surface_ros.surface.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 from limit_surface_ros.tools import fit_surface
-from limit_surface_ros.tools.compare_surfaces import main
+from limit_surface_ros.tools.compare_surfaces import main, size_of
 
 CONTACT = """schema: 1
 name: triangle
@@ -69,6 +70,20 @@ def test_errors_of_loads_stand_beside_those_of_motions_in_one_unit(contact, tmp_
     assert worst["small"] > 0.2
 
 
+@pytest.mark.parametrize(("frame", "point"), [("other", (0.0, 0.0)), ("object", (0.01, 0.0))])
+def test_what_is_about_another_point_or_frame_is_not_compared(
+    contact, tmp_path, capsys, frame, point
+):
+    model = tmp_path / "there.yaml"
+    surface = PowerSum(np.eye(3)[None], [1.0], Scaling(0.08, 1.0))
+    there = SurfaceModel("there", surface, frame_id=frame, reference_point=point)
+    write_surface_model(there, model)
+    assert main([str(contact), "--models", str(model)]) == 2
+    error = capsys.readouterr().err
+    assert f"contact.yaml is about ({0:g}, {0:g}) m in frame 'object'" in error
+    assert f"there.yaml is about ({point[0]:g}, 0) m in frame '{frame}'" in error
+
+
 def test_a_bootstrap_shows_its_spread(tmp_path, capsys):
     rng = np.random.default_rng(0)
     body = PointContacts([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]], [0.5, 0.5, 0.5])
@@ -102,12 +117,38 @@ def test_the_distributions_are_drawn(contact, tmp_path, capsys):
         ([], "nothing to compare"),
         (["--fit", "spline:3"], "got 'spline:3'"),
         (["--fit", "norms:x"], "got 'norms:x'"),
+        (["--fit", "norms:0"], "a number of terms from 1 to 1000, such as norms:4; got 'norms:0'"),
+        (["--fit", "auto:3"], "--fit auto takes no number of terms; got 'auto:3'"),
+        (["--fit", "polynomial:3"], "--fit polynomial takes no number of terms"),
+        (["--fit", "second:5"], "--fit second takes no number of terms"),
+        (["--fit", "norms:2", "--seed", "-1"], "--seed must be from 0"),
+        (["--fit", "norms:2", "--picture", "x.foo"], "x.foo: cannot be written: must end in .png"),
+        (["--fit", "norms:2", "--picture", "no/x.png"], "its folder does not exist"),
         (["--models", "none.yaml"], "none.yaml: cannot be read"),
     ],
 )
 def test_what_cannot_be_compared_is_refused(contact, capsys, arguments, message):
     assert main([str(contact), *arguments]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_a_model_that_is_not_convex_is_warned_of_in_one_plain_line(contact, tmp_path, capsys):
+    dented = tmp_path / "dented.yaml"
+    # x^4 + y^4 + m^4 + 12 x^2 y^2 bends inward.
+    cross = [1, 0, 0, 12, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1]
+    surface = Polynomial(cross, Scaling(0.08, 1.0))
+    write_surface_model(SurfaceModel("dented", surface), dented)
+    few = ["--motions", "20", "--facet-loads", "0"]
+    assert main([str(contact), "--models", str(dented), *few]) == 0
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("compare_surfaces: warning: limit surface 'dented' is not convex")
+
+
+def test_the_size_of_every_kind_is_how_many_numbers_define_it():
+    points = PointContacts([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]], [0.5, 0.5, 0.5])
+    assert size_of(points) == 9
+    assert size_of(points.dissipation()) == 18
+    assert size_of(PowerSum(np.eye(3)[None], [1.0])) == 6
 
 
 def test_a_kind_that_the_data_cannot_support_is_left_out_with_its_reason(contact, capsys):

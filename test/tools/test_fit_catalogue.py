@@ -74,6 +74,32 @@ def test_contacts_and_bags_are_objects_and_other_things_are_not(folder, tmp_path
     assert sorted(times(output)) == ["object_00.yaml", "three_points.yaml"]
 
 
+def test_models_have_the_names_and_frames_of_their_contacts(tmp_path):
+    contacts, output = tmp_path / "contacts", tmp_path / "models"
+    contacts.mkdir()
+    (contacts / "file_name.yaml").write_text(
+        "schema: 1\nname: box\nframe_id: box_frame\n"
+        "points: [[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]]\n"
+        "friction_limits: [0.5, 0.5, 0.5]\n"
+    )
+    assert run(contacts, output, "--motions", "60", "--workers", "1") == 0
+    model = read_surface_model(output / "file_name.yaml")
+    assert (model.name, model.frame_id) == ("box", "box_frame")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--seed", "-1"], "--seed must be from 0"),
+        (["--frame-id", " "], "--frame-id must not be empty"),
+        (["--dask", "foo"], "--dask must be a scheduler's address with its port, such as tcp://"),
+    ],
+)
+def test_options_are_looked_at_before_any_object_is(tmp_path, capsys, options, message):
+    assert run(tmp_path / "absent", tmp_path / "models", *options) == 2
+    assert message in capsys.readouterr().err
+
+
 def test_finished_models_are_kept_until_their_input_or_the_options_change(
     folder, tmp_path, capsys
 ):

@@ -360,3 +360,11 @@ def test_without_rosbags_the_extra_is_named(tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
     assert fit_decay.main([str(tmp_path), "--topic", "/x", "-n", "1"]) == 2
     assert "extra 'bags'" in capsys.readouterr().err
+
+
+def test_the_record_is_never_overwritten(tmp_path, capsys):
+    record = write_record(tmp_path / "record.csv").rename(tmp_path / "record.yaml")
+    before = record.read_bytes()
+    assert fit_decay.main([str(record), "-n", "2", "-o", str(record)]) == 2
+    assert "is the input" in capsys.readouterr().err
+    assert record.read_bytes() == before

@@ -2,8 +2,10 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +14,12 @@ import pytest
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.fitting.bootstrap import surfaces_of
+from limit_surface_ros.fitting.result import Errors, FitResult
 from limit_surface_ros.surface.measures import mean_angle
 from limit_surface_ros.surface.point_contacts import PointContacts
 from limit_surface_ros.surface.sampling import random_motions
 from limit_surface_ros.surface.scaling import Scaling
-from limit_surface_ros.tools.fit_surface import main
+from limit_surface_ros.tools.fit_surface import main, starts_in_words
 from process_helpers import group_is_gone, started, until
 
 RECORDED = Path(__file__).parents[3] / "shared" / "data" / "pushing"
@@ -144,12 +147,20 @@ def test_the_automatic_fit_stores_its_choice_and_its_bootstrap(pushes, tmp_path)
         (["--characteristic-length", "0"], "must be"),
         (["--name", ""], "--name must not be empty"),
         (["--output", "model.txt"], "must end in .yaml or .yml"),
-        (["--auto", "--support"], "states no support points"),
-        (["--terms", "0"], "terms must be at least 1"),
-        (["--starts", "0"], "starts must be at least 1"),
-        (["--velocity-weight", "-1"], "velocity_weight must not be negative"),
+        (["--auto", "--support"], 'CSV states them in a first line # {"support_points_m_body'),
+        (["--terms", "0"], "--terms must be from 1 to 1000, got 0"),
+        (["--starts", "0"], "--starts must be from 1 to 1000000, got 0"),
+        (["--velocity-weight", "-1"], "--velocity-weight must be from 0 to"),
         (["--rows", "1-x"], "rows must be like"),
         (["--rows", "70"], "there is no row 70"),
+        (["--rows", "0-99999999999"], "there is no row 99999999999; rows are 0 to 59"),
+        (["--frame-id", ""], "--frame-id must not be empty"),
+        (["--seed", "-1"], "--seed must be from 0 to"),
+        (["--motions", "0"], "--motions must be from 1 to 1000000, got 0"),
+        (["--load-noise", "nan"], "--load-noise must be from 0 to 1000000, got nan"),
+        (["--facet-loads", "-1"], "--facet-loads must be from 0"),
+        (["--objective", "second", "--terms", "2"], "--terms does nothing here: it is not for"),
+        (["--output", "absent/model.yaml"], "absent/model.yaml: its folder does not exist"),
     ],
 )
 def test_options_that_do_not_fit_together_are_refused(pushes, tmp_path, capsys, options, message):
@@ -157,6 +168,70 @@ def test_options_that_do_not_fit_together_are_refused(pushes, tmp_path, capsys, 
     assert main([str(pushes), "-o", str(output), *options]) == 2
     assert message in capsys.readouterr().err
     assert not output.exists()
+
+
+def test_a_contact_gives_its_model_name_frame_and_reference_point(tmp_path):
+    contact, output = tmp_path / "contact.yaml", tmp_path / "model.yaml"
+    contact.write_text(f"{CONTACT}frame_id: el_frame\nreference_point: [0.01, 0.02]\n")
+    few = [str(contact), "-o", str(output), "--terms", "1", "--motions", "50", "--starts", "1"]
+    assert main(few) == 0
+    model = read_surface_model(output)
+    assert (model.name, model.frame_id) == ("triangle", "el_frame")
+    assert model.reference_point == (0.01, 0.02)
+    assert main([*few, "--name", "foot", "--frame-id", "sole"]) == 0
+    model = read_surface_model(output)
+    assert (model.name, model.frame_id) == ("foot", "sole")
+
+
+def test_pushes_that_state_no_frame_are_of_the_frame_object(pushes, tmp_path):
+    output = tmp_path / "model.yaml"
+    assert main([str(pushes), "-o", str(output), "--terms", "1", "--starts", "1"]) == 0
+    assert read_surface_model(output).frame_id == "object"
+
+
+def test_costs_of_starts_are_told_in_one_short_line(tmp_path, capsys):
+    contact = tmp_path / "contact.yaml"
+    contact.write_text(CONTACT)
+    few = ["--motions", "200", "--facet-loads", "5", "--terms", "2", "--starts", "8"]
+    assert main([str(contact), "-o", str(tmp_path / "m.yaml"), *few]) == 0
+    (line,) = [x for x in capsys.readouterr().out.splitlines() if x.startswith("starts")]
+    assert re.fullmatch(r"starts +\d of \d starts agree(, the next best cost [\d.]+)?", line)
+
+
+def test_the_second_approximation_says_what_its_cost_is_beside_that_of_its_starts():
+    errors = Errors(60, np.zeros(3), 0.0)
+    result = FitResult(None, "", 7.9, (3.5, 3.5, 4.2), 1, 0.0, True, 0.0, errors)
+    assert starts_in_words(result) == "2 of 3 starts agree, the next best cost 4.2"
+    second = replace(result, details={"projected_cost": 3.5})
+    assert "their best cost 3.5 is of a surface that is not closed" in starts_in_words(second)
+    closed = replace(second, cost=3.5)
+    assert "not closed" not in starts_in_words(closed)
+
+
+def test_the_input_is_never_overwritten(tmp_path, capsys):
+    contact, link = tmp_path / "contact.yaml", tmp_path / "link.yaml"
+    contact.write_text(CONTACT)
+    link.symlink_to(contact)
+    for output in (contact, link, tmp_path / "." / "contact.yaml"):
+        assert main([str(contact), "-o", str(output)]) == 2
+        assert "is the input" in capsys.readouterr().err
+    assert contact.read_text() == CONTACT
+
+
+def test_what_is_wrong_with_the_data_is_told_with_their_file(pushes, tmp_path, capsys):
+    lines = pushes.read_text().splitlines()
+    pushes.write_text("\n".join(lines[:4]) + "\n")
+    assert main([str(pushes), "-o", str(tmp_path / "m.yaml")]) == 2
+    assert "pushes.csv: 3 pairs cannot determine 18 parameters" in capsys.readouterr().err
+    assert main([str(pushes), "-o", str(tmp_path / "m.yaml"), "--auto"]) == 2
+    assert "pushes.csv: 3 pushes are too few, even for a fit" in capsys.readouterr().err
+
+
+def test_data_of_a_size_that_no_model_file_takes_are_refused(tmp_path, capsys):
+    contact = tmp_path / "contact.yaml"
+    contact.write_text(CONTACT.replace("0.08", "1.0e+99"))
+    assert main([str(contact), "-o", str(tmp_path / "m.yaml")]) == 2
+    assert "a characteristic length [m]" in capsys.readouterr().err
 
 
 def test_rows_of_a_contact_are_refused(tmp_path, capsys):
@@ -170,9 +245,32 @@ def test_an_unknown_input_is_refused(tmp_path, capsys):
     other = tmp_path / "data.txt"
     other.touch()
     assert main([str(other), "-o", str(tmp_path / "m.yaml")]) == 2
-    assert ".txt is not known; accepted is" in capsys.readouterr().err
+    assert "files that end in .txt are not known; accepted is" in capsys.readouterr().err
     assert main([str(tmp_path / "none.csv"), "-o", str(tmp_path / "m.yaml")]) == 2
     assert "there is no such file" in capsys.readouterr().err
+    loop = tmp_path / "loop.csv"
+    loop.symlink_to(loop)
+    assert main([str(loop), "-o", str(tmp_path / "m.yaml")]) == 2
+    assert "loop.csv: cannot be read: Too many levels" in capsys.readouterr().err
+    assert main(["/dev/null", "-o", str(tmp_path / "m.yaml")]) == 2
+    assert "a file without a suffix is not known" in capsys.readouterr().err
+
+
+def test_that_an_input_is_absent_is_told_before_what_options_do(tmp_path, capsys):
+    output = ["-o", str(tmp_path / "m.yaml"), "--motions", "100"]
+    for absent, message in (
+        (tmp_path / "none.txt", "there is no such file"),
+        (tmp_path, "is a folder without a metadata.yaml, so no bag"),
+    ):
+        assert main([str(absent), *output]) == 2
+        assert message in capsys.readouterr().err
+
+
+def test_an_empty_name_is_no_input(tmp_path, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["", "-o", str(tmp_path / "m.yaml")])
+    assert ended.value.code == 2
+    assert "an empty name is no file" in capsys.readouterr().err
 
 
 @pytest.mark.skipif(not RECORDED.is_dir(), reason="recorded pushes are not at ../shared/data")

@@ -40,6 +40,45 @@ def test_two_models_of_one_name_cannot_be_told_apart(tmp_path, surface_file, cap
     assert "another file holds a model named 'disc'" in capsys.readouterr().err
 
 
+def test_models_about_two_points_are_not_drawn_as_if_they_were_about_one(
+    tmp_path, surface_file, capsys
+):
+    other, picture = tmp_path / "other.yaml", tmp_path / "x.png"
+    surface = PowerSum.norms([np.diag([1.0, 1.0, 2.0])])
+    write_surface_model(SurfaceModel("other", surface, reference_point=(0.1, 0.0)), other)
+    assert plot_surface.main([str(surface_file), str(other), "-o", str(picture)]) == 2
+    error = capsys.readouterr().err
+    assert "disc.yaml is about (0, 0) m in frame 'object'" in error
+    assert "other.yaml is about (0.1, 0) m" in error
+    assert not picture.exists()
+
+
+@pytest.mark.parametrize("program", [plot_surface, plot_decay])
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--dpi", "100000"], "--dpi must be from 10 to 1200, got 100000"),
+        (["--output", "x.foo"], "x.foo: cannot be written: must end in .png or .svg or .pdf"),
+        (["--output", "absent/x.png"], "absent/x.png: its folder does not exist"),
+    ],
+)
+def test_a_picture_that_cannot_be_made_is_refused_before_the_work(
+    tmp_path, program, options, message, capsys
+):
+    # The model is not looked at before the picture's options are.
+    assert program.main([str(tmp_path / "absent.yaml"), *options]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_picture_never_replaces_its_model(tmp_path, surface_file, decay_file, capsys):
+    for program, model in ((plot_surface, surface_file), (plot_decay, decay_file)):
+        named_as_picture = tmp_path / "model.png"
+        named_as_picture.write_bytes(model.read_bytes())
+        assert program.main([str(named_as_picture), "-o", str(named_as_picture)]) == 2
+        assert "is the input" in capsys.readouterr().err
+        assert named_as_picture.read_bytes() == model.read_bytes()
+
+
 def test_a_model_that_is_not_there_is_one_line_and_no_picture(tmp_path, capsys):
     picture = tmp_path / "x.png"
     absent = str(tmp_path / "absent.yaml")
