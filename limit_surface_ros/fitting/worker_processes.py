@@ -6,6 +6,7 @@ import multiprocessing
 import os
 import signal
 import threading
+import time
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 
 # Processes for each core from which on more of them only cost memory, and time to begin.
 _MOST_PER_CORE = 4
+# Time that the pool's thread gets to drop what waits [s].
+_PATIENCE = 1.0
 
 
 def available_cores() -> int:
@@ -48,12 +51,30 @@ def worker_processes(workers: int) -> Iterator[Executor]:
     try:
         yield pool
     except BaseException:
+        _forget_what_waits(pool)
         for process in set(multiprocessing.active_children()) - others:
             process.terminate()
         _let_go(pool)
         raise
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def _forget_what_waits(pool: ProcessPoolExecutor) -> None:
+    """Have the pool's thread drop the tasks that wait.
+
+    When workers end it would tell each waiting task so, and print a traceback about one that was
+    cancelled already.
+    """
+    try:
+        last = pool.submit(int)
+    except RuntimeError:
+        # The pool is broken or at its end: nothing waits.
+        return
+    pool.shutdown(wait=False, cancel_futures=True)
+    end = time.monotonic() + _PATIENCE
+    while not (last.running() or last.done()) and time.monotonic() < end:
+        time.sleep(0.001)
 
 
 def _let_go(pool: ProcessPoolExecutor) -> None:

@@ -22,7 +22,11 @@ if __name__ == "__main__":
             begun.result()
         waiting = [pool.submit(work, bytes(int(sys.argv[1]))) for _ in range(8)]
         print("at work", flush=True)
-        waiting[0].result()
+        try:
+            waiting[0].result()
+        finally:
+            for each in waiting:
+                each.cancel()
 """
 
 
@@ -36,3 +40,4 @@ def test_an_interrupt_ends_the_pool_also_while_tasks_wait_to_be_handed_out(tmp_p
     os.killpg(process.pid, signal.SIGINT)
     errors = process.communicate(timeout=20)[1]
     assert errors.rstrip().endswith("KeyboardInterrupt")
+    assert errors.count("Traceback") == 1, "of this program alone"
