@@ -16,6 +16,7 @@ from limit_surface_ros.errors import RangeError
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from concurrent.futures import Executor
+    from multiprocessing.connection import Connection
 
 # Processes for each core from which on more of them only cost memory, and time to begin.
 _MOST_PER_CORE = 4
@@ -51,10 +52,13 @@ def worker_processes(workers: int) -> Iterator[Executor]:
     try:
         yield pool
     except BaseException:
+        # A pool that was told to shut down no longer knows it.
+        reader = _end_of_tasks(pool)
         _forget_what_waits(pool)
         for process in set(multiprocessing.active_children()) - others:
             process.terminate()
-        _let_go(pool)
+        if reader is not None:
+            reader.close()
         raise
     finally:
         pool.shutdown(cancel_futures=True)
@@ -77,15 +81,14 @@ def _forget_what_waits(pool: ProcessPoolExecutor) -> None:
         time.sleep(0.001)
 
 
-def _let_go(pool: ProcessPoolExecutor) -> None:
-    """Free the thread that hands out tasks, if it waits for workers that are gone to take one.
+def _end_of_tasks(pool: ProcessPoolExecutor) -> Connection | None:
+    """Return this process's copy of the end at which workers take their tasks, if there is one.
 
-    A task larger than a pipe would hold it, and with it the program's end, for ever: Python before
-    3.11.5 (gh-94777) leaves the pipe's other end open.
+    Once they are gone it must be closed: a thread that hands out a task larger than a pipe would
+    wait for a reader, and hold the program's end, for ever. Python itself does so from 3.11.5 on
+    (gh-94777).
     """
-    reader = getattr(getattr(pool, "_call_queue", None), "_reader", None)
-    if reader is not None:
-        reader.close()
+    return getattr(getattr(pool, "_call_queue", None), "_reader", None)
 
 
 def _begin() -> None:
