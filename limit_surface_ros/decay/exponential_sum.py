@@ -8,16 +8,15 @@ exp(a t) sin(b t). This module imports numpy only, so that a node may load it at
 from __future__ import annotations
 
 import math
-from cmath import exp
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from limit_surface_ros.checks import as_floats
+from limit_surface_ros.decay.level_search import LevelSearch
 from limit_surface_ros.errors import NotFiniteError, RangeError, ShapeError, UnstableError
-from limit_surface_ros.root_bracket import root_bracket
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -26,12 +25,8 @@ if TYPE_CHECKING:
 
     Complexes: TypeAlias = NDArray[np.complex128]
 
-# Cells into which `time_to_level` cuts an interval at each level of its search.
-SEARCH_CELLS = 128
 # exp(-VANISHED) is zero in double precision.
 VANISHED = 800.0
-# Phase in a cell from which on a term is as good as vanished in the next.
-_FASTEST = 1e100
 # Exponentials that are evaluated at a time.
 BLOCK = 1 << 18
 
@@ -236,8 +231,11 @@ class ExponentialSum:
             return 0.0
         if height == 0.0:
             return math.inf
-        end = self._time_of_envelope(height)
-        return self._last_excess(0.0, end, height, end * 1e-15) or 0.0
+        return self._level_search.last_excess(height) or 0.0
+
+    @cached_property
+    def _level_search(self) -> LevelSearch:
+        return LevelSearch(self)
 
     def truncated(self, terms: int) -> ExponentialSum:
         """Return a sum of at most `terms` real terms, those with the largest coefficients.
@@ -285,95 +283,6 @@ class ExponentialSum:
                 f"the sum does not decay: its right-most rate has the real part "
                 f"{self.slowest_rate:g}, which must be below 0"
             )
-
-    def _at_one(self, time: float) -> float:
-        """Return x at one time, by plain numbers: numpy's overhead is most of the cost there."""
-        return sum((c * exp(rate * time)).real for rate, c in self._pairs)
-
-    @cached_property
-    def _pairs(self) -> list[tuple[complex, complex]]:
-        return list(zip(self.rates.tolist(), self.coefficients.tolist(), strict=True))
-
-    @cached_property
-    def _envelope(self) -> list[tuple[float, float]]:
-        """Times, each twice the one before, and sum |c| exp(Re lambda t), as far as asked for."""
-        return []
-
-    def _time_of_envelope(self, level: float) -> float:
-        """Return a time from which on sum |c| exp(Re lambda t), and so |x|, is below a level."""
-        for end, height in self._envelope:
-            if height <= level:
-                return end
-        sizes = np.abs(self.coefficients)
-        while True:
-            if self._envelope:
-                end = 2.0 * self._envelope[-1][0]
-            else:
-                end = 1.0 / float(np.abs(self.rates.real).max())
-            height = float(sizes @ np.exp(self.rates.real * end))
-            self._envelope.append((end, height))
-            if height <= level:
-                return end
-
-    @cached_property
-    def _whole(self) -> dict[float, _Cells]:
-        """The cells of [0, end] by the ends that levels led to: these are few."""
-        return {}
-
-    def _cells(self, start: float, end: float) -> _Cells:
-        times = np.linspace(start, end, SEARCH_CELLS + 1)
-        width = (end - start) / SEARCH_CELLS
-        values = np.abs(self._at(times))
-        # In units of the width, so that no square of a rate runs out of numbers.
-        speeds = np.minimum(np.abs(self.rates) * width, _FASTEST)
-        bends = np.exp(np.multiply.outer(times[:-1], self.rates.real)) @ (
-            np.abs(self.coefficients) * speeds**2
-        )
-        highest = np.maximum(values[:-1], values[1:]) + bends / 8.0
-        return _Cells(times, values, bends, highest)
-
-    def _last_excess(
-        self, start: float, end: float, level: float, resolution: float
-    ) -> float | None:
-        """Return the last time in [start, end] at which |x| exceeds a level, if there is one."""
-        if start > 0.0:
-            cells = self._cells(start, end)
-        else:
-            if end not in self._whole:
-                self._whole[end] = self._cells(start, end)
-            cells = self._whole[end]
-        width = (end - start) / SEARCH_CELLS
-        for cell in np.flatnonzero(cells.highest > level)[::-1].tolist():
-            left, right = cells.times[cell : cell + 2].tolist()
-            if width <= resolution or not left < 0.5 * (left + right) < right:
-                return float(right if cells.values[cell] > level else left)
-            if cells.values[cell] > level >= cells.values[cell + 1]:
-                slope = sum((c * rate * exp(rate * left)).real for rate, c in self._pairs)
-                # Steeper than the curvature can undo, x falls through the level once.
-                if abs(slope) * width > cells.bends[cell]:
-                    return root_bracket(
-                        lambda t: level - abs(self._at_one(t)), left, right, resolution
-                    )[1]
-            found = self._last_excess(left, right, level, resolution)
-            if found is not None:
-                return found
-        return None
-
-
-class _Cells(NamedTuple):
-    """What is known of |x| in the cells of an interval.
-
-    Attributes:
-        times: Their ends, shape (n + 1,).
-        values: |x| there.
-        bends: Bound of |x''| times the square of the width within each, shape (n,).
-        highest: Bound of |x| within each, shape (n,).
-    """
-
-    times: Floats
-    values: Floats
-    bends: Floats
-    highest: Floats
 
 
 def _used_columns(rates: Complexes) -> Bools:
