@@ -157,8 +157,9 @@ def _declared(node: Node, setting: Setting) -> Any:
     except InvalidParameterTypeException as error:
         given = node.handle.get_parameters(Parameter).get(setting.name)
         if isinstance(setting.default, float) and given is not None and type(given.value) is int:
-            value = f"{setting.name} must have a decimal point: write {given.value}.0"
-            raise RangeError(value) from error
+            raise RangeError(
+                f"{setting.name} must have a decimal point: write {given.value}.0"
+            ) from error
         raise
 
 

@@ -91,11 +91,8 @@ def help_of(node: str, table: Iterable[Setting]) -> str:
     lines = [f"parameters of {node}, with their defaults:"]
     for setting in table:
         lines.append(f"  {setting.name} := {setting.written}")
-        meaning = (
-            f"{setting.description} ({setting.accepted})"
-            if setting.accepted
-            else (setting.description)
-        )
+        accepted = f" ({setting.accepted})" if setting.accepted else ""
+        meaning = f"{setting.description}{accepted}"
         lines += textwrap.wrap(
             meaning, 92, initial_indent=" " * 6, subsequent_indent=" " * 6, break_on_hyphens=False
         )
