@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from limit_surface_ros.errors import FileError, MissingExtraError
-from limit_surface_ros.files.yaml_reader import write_atomically
+from limit_surface_ros.files.atomic_write import write_atomically
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from limit_surface_ros.checks import LARGEST
 from limit_surface_ros.errors import FileError
-from limit_surface_ros.files.yaml_reader import read_yaml, write_atomically, write_yaml
+from limit_surface_ros.files.atomic_write import write_atomically
+from limit_surface_ros.files.yaml_reader import read_yaml, write_yaml
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from limit_surface_ros import __version__
-from limit_surface_ros.files.yaml_reader import write_atomically
+from limit_surface_ros.files.atomic_write import write_atomically
 from limit_surface_ros.plots.thesis.page import page_of
 from limit_surface_ros.plots.thesis.settings import FULL
 

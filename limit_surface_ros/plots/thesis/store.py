@@ -15,12 +15,13 @@ import numpy as np
 
 from limit_surface_ros import __version__
 from limit_surface_ros.errors import FileError
+from limit_surface_ros.files.atomic_write import write_atomically
 from limit_surface_ros.files.surface_file import (
     SurfaceModel,
     read_surface_model,
     write_surface_model,
 )
-from limit_surface_ros.files.yaml_reader import plain, write_atomically
+from limit_surface_ros.files.yaml_reader import plain
 from limit_surface_ros.plots.canvas import save_figure
 from limit_surface_ros.plots.thesis.findings import Claim
 from limit_surface_ros.surface.convexity import NotConvexWarning
