@@ -96,20 +96,9 @@ class DissipationSurface(ScaledSurface):
             return None
         return OneMotion(np.array([root_of(form) for form in forms]), self._inverse_of_any)
 
-    def twist_and_load_factor(self, wrench: ArrayLike) -> tuple[Floats, Floats]:
-        """Direction of the incipient motion and load factor, found together; see the base."""
-        one = one_direction(wrench)
-        found = None if one is None else self._motion_of_one(one)
-        if found is not None:
-            motion, factor = found
-            return np.array(self._twist_along(motion)), np.float64(factor)
-        array = as_directions("wrench", wrench)
-        twists, factors = np.empty((array.size // 3, 3)), np.empty(array.size // 3)
-        for block, columns, sizes in self._blocks(array, self.scaling.wrench_unit):
-            motions, factors[block] = self._solve(columns)
-            factors[block] *= sizes
-            np.multiply(of_unit_length(motions).T, self.scaling.twist_unit, out=twists[block])
-        return twists.reshape(array.shape), factors.reshape(array.shape[:-1])[()]
+    def _twist_and_load_factor_of_one(self, wrench: Vector) -> tuple[Vector, float] | None:
+        found = self._motion_of_one(wrench)
+        return None if found is None else (self._twist_along(found[0]), found[1])
 
     def _twist_of_one(self, wrench: Vector) -> Vector | None:
         found = self._motion_of_one(wrench)
@@ -160,6 +149,10 @@ class DissipationSurface(ScaledSurface):
 
     def _twists(self, loads: Floats) -> Floats:
         return of_unit_length(self._solve(loads)[0])
+
+    def _twists_and_load_factors(self, loads: Floats) -> tuple[Floats, Floats]:
+        motions, factors = self._solve(loads)
+        return of_unit_length(motions), factors
 
     def _load_factors(self, loads: Floats) -> Floats:
         factors = np.zeros(loads.shape[1])

@@ -31,6 +31,10 @@ class DissipationTerms(Gauge, Protocol):
         """Return the gradient (3, m) of D; a term at its kink adds nothing."""
         ...
 
+    def values_and_normals(self, twists: Floats) -> tuple[Floats, Floats]:
+        """Return D (m,) and its gradient (3, m), as `gradient` does."""
+        ...
+
     def corners(self) -> Corners | None:
         """Return the motions at which one term is at rest: facets of the set of loads."""
         ...
@@ -53,15 +57,20 @@ class FormTerms:
 
         In the precision of the twists.
         """
+        return self.values_and_normals(twists)[1]
+
+    def values_and_normals(self, twists: Floats) -> tuple[Floats, Floats]:
+        """Return D (m,) and its gradient (3, m), as `gradient` does."""
         roots = self._stacked_roots.astype(twists.dtype, copy=False)
         images = (roots @ twists).reshape(-1, 3, twists.shape[1])
         norms = np.sqrt(np.einsum("kcm,kcm->km", images, images))
+        values = np.add.reduce(norms)
         # The least of all norms is cheaper than one bound for each, and is most often enough.
         if norms.min() <= self._most * np.abs(twists).max():
             length = np.abs(twists).max(axis=0)
             norms[norms <= self._least[:, np.newaxis] * length] = np.inf
         images /= norms[:, np.newaxis]
-        return np.asarray(roots.T @ images.reshape(-1, twists.shape[1]))
+        return values, np.asarray(roots.T @ images.reshape(-1, twists.shape[1]))
 
     def values(self, twists: Floats) -> Floats:
         """Return D (m,)."""
@@ -132,6 +141,11 @@ class PointTerms:
             loads.append(pulls @ velocities.reshape(-1, columns))
         total: Floats = sum(loads[1:], start=loads[0])
         return total
+
+    def values_and_normals(self, twists: Floats) -> tuple[Floats, Floats]:
+        """Return D (m,) and its gradient (3, m), as `gradient` does."""
+        gradient = self.gradient(twists)
+        return np.einsum("im,im->m", gradient, twists), gradient
 
     def values(self, twists: Floats) -> Floats:
         """Return D (m,)."""

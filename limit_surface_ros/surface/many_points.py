@@ -78,11 +78,11 @@ class ManyPointsInverse:
         """Return no start: beside a support point none leads smoothly to the answer."""
         return np.empty((0, 3))
 
-    def gradient(self, twists: Floats) -> Floats:
-        """Return the gradients (3, m) of D, NaN where a point is near to rest."""
+    def values_and_normals(self, twists: Floats) -> tuple[Floats, Floats]:
+        """Return D (m,) and its gradients (3, m), NaN where a point is near to rest."""
         gradients, clear = self._gradients(of_unit_length(twists))
         gradients[:, ~clear] = np.nan
-        return gradients
+        return np.einsum("im,im->m", gradients, twists), gradients
 
     def _approach(self, units: Floats, basis: Floats) -> tuple[Floats, Floats]:
         """Return twists (3, m) right to single precision, and Hessians (3, 3, m) close by."""

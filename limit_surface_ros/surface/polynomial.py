@@ -105,11 +105,10 @@ class Polynomial(ScaledSurface):
         """Return the gauge P^(1/4) (m,) of scaled loads (3, m); see `plane_minimum.Gauge`."""
         return self._load_factors(loads)
 
-    def gauge_gradient(self, loads: Floats) -> Floats:
-        """Return the gradient (3, m) of the gauge P^(1/4) at scaled loads (3, m)."""
+    def values_and_normals(self, loads: Floats) -> tuple[Floats, Floats]:
+        """Return the gauge P^(1/4) (m,) of scaled loads (3, m) and the gradient of P (3, m)."""
         gradient = self._gradient(loads)
-        value = (gradient * loads).sum(axis=0) / 4.0
-        return np.asarray(gradient * (0.25 * value**-0.75))
+        return _gauge(loads, gradient), gradient
 
     def derivatives(self, loads: Floats, _smoothing: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the gauge P^(1/4) of scaled loads (3, m); see `plane_minimum.Gauge`."""
@@ -121,8 +120,7 @@ class Polynomial(ScaledSurface):
         return gauge, factor * gradient, factor * (hessian - 0.75 / value * outer)
 
     def _load_factors(self, loads: Floats) -> Floats:
-        values = (self._gradient(loads) * loads).sum(axis=0) / 4.0
-        return np.asarray(np.sqrt(np.sqrt(values)))
+        return _gauge(loads, self._gradient(loads))
 
     def _twists(self, loads: Floats) -> Floats:
         return of_unit_length(self._gradient(loads))
@@ -171,14 +169,20 @@ class _Framed:
     def values(self, points: Floats) -> Floats:
         return self._polynomial.values(self._frame @ points)
 
-    def gradient(self, points: Floats) -> Floats:
-        turned: Floats = self._frame.T @ self._polynomial.gauge_gradient(self._frame @ points)
-        return turned
+    def values_and_normals(self, points: Floats) -> tuple[Floats, Floats]:
+        values, normals = self._polynomial.values_and_normals(self._frame @ points)
+        return values, self._frame.T @ normals
 
     def derivatives(self, points: Floats, smoothing: Floats) -> tuple[Floats, Floats, Floats]:
         gauge, gradient, hessian = self._polynomial.derivatives(self._frame @ points, smoothing)
         turned = np.einsum("ai,abm,bj->ijm", self._frame, hessian, self._frame)
         return gauge, self._frame.T @ gradient, turned
+
+
+def _gauge(loads: Floats, gradient: Floats) -> Floats:
+    """Return P^(1/4) (m,) from loads (3, m) and the gradient of P, by Euler's theorem."""
+    values = 0.25 * np.einsum("im,im->m", gradient, loads)
+    return np.asarray(np.sqrt(np.sqrt(values)))
 
 
 def _second_derivatives(coefficients: Floats) -> Floats:

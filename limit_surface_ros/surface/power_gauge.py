@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.surface.corners import Corners
-from limit_surface_ros.surface.power_sum_scale import log_scales, scale_and_shares
+from limit_surface_ros.surface.power_sum_scale import power_scale
 from limit_surface_ros.surface.quadratic_form import solve_symmetric
 
 if TYPE_CHECKING:
@@ -23,23 +23,24 @@ class PowerGauge:
         self._forms = np.swapaxes(roots, 1, 2) @ roots
         self._sizes = np.trace(self._forms, axis1=1, axis2=2)[:, np.newaxis]
         self._exponents = exponents
+        self._scale = power_scale(exponents)
 
     def values(self, loads: Floats) -> Floats:
         """Return g (m,)."""
         images = self._roots @ loads
-        return np.exp(-log_scales(np.einsum("kcm,kcm->km", images, images), self._exponents))
+        return self._scale.load_factors(np.einsum("kcm,kcm->km", images, images))
 
-    def gradient(self, loads: Floats) -> Floats:
-        """Return the gradient (3, m) of g; a term that does not see a load adds nothing."""
+    def values_and_normals(self, loads: Floats) -> tuple[Floats, Floats]:
+        """Return g (m,) and vectors (3, m) along its gradient, of any length.
+
+        A term that does not see a load adds nothing to them.
+        """
         roots = self._roots.reshape(-1, 3)
         images = (roots @ loads).reshape(-1, 3, loads.shape[1])
-        values = np.einsum("kcm,kcm->km", images, images)
-        t, weights = scale_and_shares(values, self._exponents)
-        weights *= self._exponents[:, np.newaxis]
-        weights /= weights.sum(axis=0) * np.exp(t)
-        weights /= np.where(values > 0.0, values, np.inf)
+        forms = np.einsum("kcm,kcm->km", images, images)
+        values, weights = self._scale.load_factors_and_weights(forms)
         images *= weights[:, np.newaxis]
-        return np.asarray(roots.T @ images.reshape(-1, loads.shape[1]))
+        return values, np.asarray(roots.T @ images.reshape(-1, loads.shape[1]))
 
     def derivatives(self, loads: Floats, smoothing: Floats) -> tuple[Floats, Floats, Floats]:
         """Return g, its gradient and its Hessian; see `plane_minimum.Gauge`.
@@ -49,8 +50,8 @@ class PowerGauge:
         """
         images = self._roots @ loads
         values = np.einsum("kcm,kcm->km", images, images) + self._sizes * smoothing**2
-        t = -log_scales(values, self._exponents)
-        gauge = np.exp(t)
+        gauge = self._scale.load_factors(values)
+        t = np.log(gauge)
         total = np.zeros_like(t)
         second_total = np.zeros_like(t)
         gradient: Floats = np.zeros_like(loads)
@@ -97,10 +98,8 @@ class PowerGauge:
         images = self._roots @ loads
         values = np.einsum("kcm,kcm->km", images, images)
         values = np.maximum(values, 1e-30 * self._sizes * (loads * loads).sum(axis=0))
-        p = self._exponents[:, np.newaxis]
-        log_scale = log_scales(values, self._exponents)
-        shares = p * np.exp(p * (np.log(values) + 2.0 * log_scale))
-        weights = shares / (values * np.exp(2.0 * log_scale) * shares.sum(axis=0))
+        gauge, weights = self._scale.load_factors_and_weights(values)
+        weights *= gauge * gauge / (weights * values).sum(axis=0)
         forms: Floats = (self._forms.reshape(-1, 9).T @ weights).reshape(3, 3, -1)
         # Beside a ridge one term outweighs all others: keep the form regular.
         diagonal = np.einsum("iim->im", forms)
@@ -123,7 +122,7 @@ class PowerGauge:
             axes[alone],
             roots[alone],
         )
-        scale = np.exp(log_scales(values, self._exponents))
+        scale = 1.0 / self._scale.load_factors(values)
         gradient: Floats = np.zeros((3, len(axes)))
         hessian: Floats = np.zeros((3, 3, len(axes)))
         for root, form, image, value, p in zip(

@@ -19,7 +19,7 @@ from limit_surface_ros.surface.one_load import (
 )
 from limit_surface_ros.surface.one_twist import most_power_of_one
 from limit_surface_ros.surface.power_sum_inverse import power_sum_inverse
-from limit_surface_ros.surface.power_sum_scale import log_scales, scale_and_shares
+from limit_surface_ros.surface.power_sum_scale import PowerScale, power_scale
 from limit_surface_ros.surface.quadratic_form import BLIND, as_psd_matrices, root_of
 from limit_surface_ros.surface.scaled_surface import ScaledSurface
 from limit_surface_ros.surface.scaling import Scaling
@@ -169,6 +169,10 @@ class PowerSum(ScaledSurface):
         return len(self.matrices) == 1 or bool((self.exponents == 0.5).all())
 
     @cached_property
+    def _scale(self) -> PowerScale:
+        return power_scale(self.exponents)
+
+    @cached_property
     def _stacked_roots(self) -> Floats:
         """The R_i above each other, shape (3 k, 3)."""
         return self._roots.reshape(-1, 3)
@@ -210,9 +214,12 @@ class PowerSum(ScaledSurface):
         forms = self._forms(self._images(loads), loads)
         if self._is_norm:
             return np.asarray(np.sqrt(forms).sum(axis=0))
-        return np.exp(-log_scales(forms, self.exponents))
+        return self._scale.load_factors(forms)
 
     def _twists(self, loads: Floats) -> Floats:
+        return self._twists_and_load_factors(loads)[0]
+
+    def _twists_and_load_factors(self, loads: Floats) -> tuple[Floats, Floats]:
         images = self._images(loads)
         forms = self._forms(images, loads)
         seen = forms.all()
@@ -223,20 +230,18 @@ class PowerSum(ScaledSurface):
                 f"amount of it, scaled direction {unlimited}"
             )
         if self._is_norm:
-            weights = np.sqrt(forms)
+            norms = np.sqrt(forms)
+            factors = np.add.reduce(norms)
+            if not seen:
+                # A term that does not see the load adds nothing to its normal.
+                norms[norms == 0.0] = np.inf
+            images /= norms[:, np.newaxis]
         else:
-            shares = scale_and_shares(forms, self.exponents)[1]
-            shares *= self.exponents[:, np.newaxis]
-            weights = np.divide(forms, shares, out=np.zeros_like(forms), where=shares > 0.0)
-        if not (seen and self._is_norm):
-            # A term that does not see the load adds nothing to its normal.
-            weights[weights == 0.0] = np.inf
-        images /= weights[:, np.newaxis]
-        gradient = self._stacked_roots.T @ images.reshape(-1, images.shape[2])
-        if not self._is_norm:
-            gradient /= np.abs(gradient).max(axis=0)
-        gradient /= np.sqrt(_squared(gradient))
-        return np.asarray(gradient)
+            factors, weights = self._scale.load_factors_and_weights(forms)
+            images *= weights[:, np.newaxis]
+        normals = self._stacked_roots.T @ images.reshape(-1, images.shape[2])
+        normals /= np.sqrt(_squared(normals))
+        return np.asarray(normals), factors
 
     def _loads(self, twists: Floats) -> Floats:
         if len(self._free):

@@ -62,6 +62,10 @@ class ScaledSurface(ABC):
     def _loads(self, twists: Floats) -> Floats:
         """Map scaled twists (3, m), none zero, to scaled loads (3, m) on the surface."""
 
+    def _twists_and_load_factors(self, loads: Floats) -> tuple[Floats, Floats]:
+        """Map scaled loads (3, m), none zero, to unit scaled twists (3, m) and factors (m,)."""
+        return self._twists(loads), self._load_factors(loads)
+
     def _load_factor_of_one(self, _wrench: Vector) -> float | None:
         """Map one wrench in physical units; None leaves it to the map of many."""
         return None
@@ -69,6 +73,11 @@ class ScaledSurface(ABC):
     def _twist_of_one(self, _wrench: Vector) -> Vector | None:
         """Map one wrench to a twist, both in physical units; None leaves it to the map of many."""
         return None
+
+    def _twist_and_load_factor_of_one(self, wrench: Vector) -> tuple[Vector, float] | None:
+        """Map one wrench to both, in physical units; None leaves it to the map of many."""
+        twist, factor = self._twist_of_one(wrench), self._load_factor_of_one(wrench)
+        return None if twist is None or factor is None else (twist, factor)
 
     def _wrench_of_one(self, _twist: Vector) -> Vector | None:
         """Map one twist to a wrench, both in physical units; None leaves it to the map of many."""
@@ -141,7 +150,7 @@ class ScaledSurface(ABC):
         return self._mapped(array, self.scaling.wrench_unit, self._twists, self.scaling.twist_unit)
 
     def twist_and_load_factor(self, wrench: ArrayLike) -> tuple[Floats, Floats]:
-        """Direction of the incipient motion and load factor, at the cost of one if that is less.
+        """Direction of the incipient motion and load factor, for less than both cost apart.
 
         Args:
             wrench: Shape (..., 3), (fx, fy, tau_z) in [N, N, N m], not zero.
@@ -154,7 +163,18 @@ class ScaledSurface(ABC):
             NotFiniteError: A component is NaN or infinite.
             ZeroVectorError: A wrench is zero.
         """
-        return self.twist_of_wrench(wrench), self.load_factor(wrench)
+        one = one_direction(wrench)
+        if one is not None:
+            found = self._twist_and_load_factor_of_one(one)
+            if found is not None:
+                return np.array(found[0]), np.float64(found[1])
+        array = as_directions("wrench", wrench)
+        twists, factors = np.empty((array.size // 3, 3)), np.empty(array.size // 3)
+        for block, columns, sizes in self._blocks(array, self.scaling.wrench_unit):
+            scaled_twists, scaled_factors = self._twists_and_load_factors(columns)
+            np.multiply(scaled_factors, sizes, out=factors[block])
+            np.multiply(scaled_twists.T, self.scaling.twist_unit, out=twists[block])
+        return twists.reshape(array.shape), factors.reshape(array.shape[:-1])[()]
 
     def wrench_of_twist(self, twist: ArrayLike) -> Floats:
         """Load of maximum dissipation: the wrench on the surface with the most power.

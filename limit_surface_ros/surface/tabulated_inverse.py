@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from limit_surface_ros.surface.gauge_inverse import Inverse
 
 # Cells of the table along each axis of the chart.
-_CELLS = 48
+_CELLS = 80
 # Powers of x and y in a cell's polynomial, y by y for each power of x.
 _DEGREE = 5
 _POWERS = [(i, j) for i in range(_DEGREE + 1) for j in range(_DEGREE + 1 - i)]
@@ -32,8 +32,13 @@ _POWERS = [(i, j) for i in range(_DEGREE + 1) for j in range(_DEGREE + 1 - i)]
 _WORTH = (2 * _CELLS + 1) ** 2
 # Steps along the curvature until a point counts as hard.
 _STEPS = 6
-# Distance in the chart within which a last step proves the point; its own error is a part of that.
-_LAST_STEP = 1e-10
+# Length in the chart of a step that proves the point in any cell, and in none: the square of the
+# latter is how far from the surface a step leads.
+_SHORT_STEP, _LONG_STEP = 1e-10, 1e-6
+# Between these a step is the last if it leaves an error below this, the error being the part of a
+# step that is known of the cell. That part is met in few places, so that more is taken.
+_ERROR = 1e-11
+_MORE = 4.0
 # Part of a surface's size by which points of one sheet differ at most, found in two ways.
 _SAME = 1e-9
 # Error of a cell's polynomial, in parts of D, above which two sheets may meet in the cell: their
@@ -44,8 +49,11 @@ _SMOOTH = 1e-6
 class FirstOrder(Protocol):
     """A gauge with its gradient; see `plane_minimum.Gauge`."""
 
-    def gradient(self, points: Floats, /) -> Floats:
-        """Return the gradients (3, m) at points (3, m); what is at a kink adds nothing."""
+    def values_and_normals(self, points: Floats, /) -> tuple[Floats, Floats]:
+        """Return the values (m,) at points (3, m) and vectors (3, m) along the gradients.
+
+        These may have any length; what is at a kink adds nothing to them.
+        """
         ...
 
 
@@ -122,8 +130,10 @@ class SupportTable:
             self._coefficients = coefficients.astype(np.float32)
         # A cell that proves nothing, as within a corner's cone, is not worth reading.
         self._useful: Bools = np.ones(_CELLS**2, dtype=bool)
+        self._last_step: Floats = np.full(_CELLS**2, _SHORT_STEP)
         middles = _normals(_grid((np.arange(2 * _CELLS) + 0.5) / _CELLS - 1.0))
         found, certain = self.points(middles)
+        self._last_step = _of_cells(self._last_steps(middles)).min(axis=0)
         if convex:
             self._useful = np.asarray(_of_cells(certain).any(axis=0))
         else:
@@ -136,8 +146,7 @@ class SupportTable:
         """Return points (3, m) for vectors (3, m), none zero, and which are certain (m,)."""
         sign = np.where(normals[2] < 0.0, -1.0, 1.0)
         place = _chart(normals * sign)
-        row, column = np.minimum((0.5 * _CELLS * (place + 1.0)).astype(np.intp), _CELLS - 1)
-        cell = row * _CELLS + column
+        cell = _cell(place)
         certain = self._useful.take(cell)
         # What runs out of digits or numbers on the way ends as not certain.
         with np.errstate(all="ignore"):
@@ -155,24 +164,41 @@ class SupportTable:
     def _prove(self, place: Floats, cell: Places) -> tuple[Floats, Bools]:
         """Return points (3, m) for places (2, m) in the cells (m,), and which are certain (m,)."""
         points, local = self._read(place, cell)
-        points, _ = self._step(points, place, local)
         points, away = self._step(points, place, local)
-        certain = _is_last(away)
-        for _ in range(_STEPS - 2):
-            todo = np.flatnonzero(~certain)
+        last_step = self._last_step.take(cell)
+        certain = away <= last_step
+        todo = np.flatnonzero(~certain)
+        for _ in range(_STEPS - 1):
             if len(todo) == 0:
                 break
             points[:, todo], away = self._step(
                 *(each.take(todo, axis=1) for each in (points, place, local))
             )
-            certain[todo] = _is_last(away)
+            done = away <= last_step.take(todo)
+            certain[todo] = done
+            todo = todo[~done]
         return points, certain
 
+    def _last_steps(self, normals: Floats) -> Floats:
+        """Return how long a last step may be (m,), by what one leaves at normals (3, m)."""
+        place = _chart(normals)
+        with np.errstate(all="ignore"):
+            points, local = self._read(place, _cell(place))
+            points, first = self._step(points, place, local)
+            _, second = self._step(points, place, local)
+            allowed = _ERROR / _MORE * first / second
+        # NaN, of a step from nowhere, is a hard place.
+        allowed[~(allowed > _SHORT_STEP)] = _SHORT_STEP
+        return np.asarray(np.minimum(allowed, _LONG_STEP))
+
     def _step(self, points: Floats, place: Floats, local: Floats) -> tuple[Floats, Floats]:
-        """Return points (3, m) nearer to the right ones, and the way there on the chart (2, m)."""
-        gradient = self._gauge.gradient(points)
-        points = points / (points * gradient).sum(axis=0)
-        away = place - _chart(gradient)
+        """Return points (3, m) nearer to the right ones, and how far these were on the chart (m,).
+
+        That is the larger of the distances along its axes.
+        """
+        values, normals = self._gauge.values_and_normals(points)
+        points = points / values
+        away = place - _chart(normals)
         # Moves are short: the digits that single precision keeps of them are enough.
         a, b, lift, bend_aa, bend_ab, bend_bb = local
         da, db = away.astype(np.float32)
@@ -184,7 +210,7 @@ class SupportTable:
         points[0] += rise_a + a * rise + z * da
         points[1] += rise_b + b * rise + z * db
         points[2] += rise
-        return points, away
+        return points, np.maximum(*np.abs(away))
 
     def _read(self, place: Floats, cell: Places) -> tuple[Floats, Floats]:
         """Return points (3, m) at places (2, m) in the cells (m,), and what is there (6, m).
@@ -217,10 +243,10 @@ class SupportTable:
         return np.array([slope_a + a * z, slope_b + b * z, z]), local
 
 
-def _is_last(away: Floats) -> Bools:
-    """Return whether a step of (2, m) on the chart was the last (m,)."""
-    da, db = away
-    return np.asarray((np.abs(da) <= _LAST_STEP) & (np.abs(db) <= _LAST_STEP))
+def _cell(place: Floats) -> Places:
+    """Return the numbers (m,) of the cells of places (2, m)."""
+    row, column = np.minimum((0.5 * _CELLS * (place + 1.0)).astype(np.intp), _CELLS - 1)
+    return row * _CELLS + column
 
 
 def _grid(ticks: Floats) -> Floats:

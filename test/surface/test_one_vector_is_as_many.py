@@ -133,7 +133,7 @@ def test_motion_and_load_factor_together_are_what_they_are_alone(surface, shape)
 @pytest.mark.parametrize("surface", SURFACES, ids=lambda surface: surface.kind)
 def test_a_surface_is_sent_to_another_process_without_what_it_has_worked_out(surface):
     before = len(pickle.dumps(surface))
-    vectors = RNG.standard_normal((20_000, 3))
+    vectors = RNG.standard_normal((30_000, 3))
     wrenches = surface.wrench_of_twist(vectors)
     surface.twist_of_wrench(vectors)
     sent = pickle.dumps(surface)
