@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stddef.h>
 
-enum { MOST_TERMS = 16, MOST_STEPS = 60 };
+enum { MOST_TERMS = 16, MOST_STEPS = 60, MOST_DEGREE = 4 };
 
 static double image_of(const double *root, const double *load, double *image)
 {
@@ -40,36 +40,67 @@ static void write_twist(const double *normal, const double *unit, double *out)
         out[column] = normal[column] / norm * unit[column];
 }
 
-/* H(f) = sum_i (f' A_i f)^p_i: the scale by Newton's method on its logarithm, then the normal. */
-void power_sum_twists(const double *roots, const double *powers, int terms,
+static double part_of(double form, int degree)
+{
+    switch (degree) {
+    case 1: return form;
+    case 2: return sqrt(form);
+    case 3: return cbrt(form);
+    default: return sqrt(sqrt(form));
+    }
+}
+
+static double whole_power(double number, int power)
+{
+    double result = 1.0;
+    while (power-- > 0)
+        result *= number;
+    return result;
+}
+
+/* The root of w^n = sum_m c_m w^(n - m), from beyond it by Newton's method. */
+static double root_of_equation(const double *sums, int degree, double most)
+{
+    if (degree == 1)
+        return sums[0];
+    double rest = sums[degree - 1];
+    for (int power = degree - 1; power >= 2; power--)
+        rest = sums[power - 1] + rest / most;
+    double root = 0.5 * (sums[0] + sqrt(sums[0] * sums[0] + 4.0 * rest));
+    if (degree == 2)
+        return root;
+    for (int step = 0; step < MOST_STEPS; step++) {
+        double value = root - sums[0], slope = 2.0 * root - sums[0];
+        for (int power = 2; power < degree; power++) {
+            value = value * root - sums[power - 1];
+            slope = slope * root + value;
+        }
+        double change = (value * root - sums[degree - 1]) / slope;
+        root -= change;
+        if (change <= 1e-7 * root)
+            break;
+    }
+    return root;
+}
+
+/* H(f) = sum_i (f' A_i f)^(m_i / n): the scale as the root of a polynomial, then the normal. */
+void power_sum_twists(const double *roots, const int *powers, int degree, int terms,
     const double *wrench_unit, const double *twist_unit, const double *in, double *out, size_t n)
 {
-    double images[3 * MOST_TERMS], forms[MOST_TERMS], logs[MOST_TERMS];
+    double images[3 * MOST_TERMS], parts[MOST_TERMS];
     for (size_t i = 0; i < n; i++, in += 3, out += 3) {
-        double load[3], normal[3] = {0.0, 0.0, 0.0}, largest = -INFINITY;
+        double load[3], normal[3] = {0.0, 0.0, 0.0}, sums[MOST_DEGREE] = {0.0}, most = 0.0;
         scale_load(in, wrench_unit, load);
         for (int term = 0; term < terms; term++) {
-            forms[term] = image_of(roots + 9 * term, load, images + 3 * term);
-            logs[term] = log(forms[term]);
-            largest = fmax(largest, logs[term]);
+            parts[term] = part_of(image_of(roots + 9 * term, load, images + 3 * term), degree);
+            most = fmax(most, parts[term]);
+            sums[powers[term] - 1] += whole_power(parts[term], powers[term]);
         }
-        double t = -0.5 * largest;
-        for (int step = 0; step < MOST_STEPS; step++) {
-            double value = 0.0, slope = 0.0;
-            for (int term = 0; term < terms; term++) {
-                double part = exp(powers[term] * (2.0 * t + logs[term]));
-                value += part;
-                slope += 2.0 * powers[term] * part;
-            }
-            double change = log(value) * value / slope;
-            t -= change;
-            if (fabs(change) <= 1e-9)
-                break;
-        }
+        double root = root_of_equation(sums, degree, most);
         for (int term = 0; term < terms; term++)
-            if (forms[term] > 0.0)
+            if (parts[term] > 0.0)
                 add_pull(roots + 9 * term, images + 3 * term,
-                    powers[term] * exp((powers[term] - 1.0) * (logs[term] + 2.0 * t)), normal);
+                    powers[term] * whole_power(root / parts[term], degree - powers[term]), normal);
         write_twist(normal, twist_unit, out);
     }
 }

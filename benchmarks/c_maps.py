@@ -56,6 +56,8 @@ def map_in_c(
 ) -> tuple[str, Callable[[Floats], Floats]]:
     """Return the name of the surface's map in closed form, and that map as a loop in C.
 
+    Sums of powers must be norms or of the thesis's family.
+
     It takes contiguous rows (n, 3).
     """
     wrench_unit, twist_unit = surface.scaling.wrench_unit, surface.scaling.twist_unit
@@ -64,7 +66,10 @@ def map_in_c(
         constants = [roots, len(powers), wrench_unit, twist_unit]
         if (powers == 0.5).all():
             return "twist_of_wrench", _loop(library.norm_sum_twists, constants)
-        return "twist_of_wrench", _loop(library.power_sum_twists, [roots, powers, *constants[1:]])
+        degree = len(powers)
+        whole = np.rint(degree * powers).astype(np.intc)
+        constants = [roots, whole, degree, *constants[1:]]
+        return "twist_of_wrench", _loop(library.power_sum_twists, constants)
     if isinstance(surface, Polynomial):
         constants = [surface._second, wrench_unit, twist_unit]
         return "twist_of_wrench", _loop(library.quartic_twists, constants)

@@ -42,10 +42,7 @@ def as_floats(name: str, values: ArrayLike) -> Floats:
         ShapeError: The values are ragged or no numbers.
         NotFiniteError: A value is NaN or infinite; the error gives the first one's place.
     """
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ShapeError(f"{name} must be an array of numbers: {error}") from None
+    array = _as_numbers(name, values)
     if not np.isfinite(array).all():
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         where = f" at index {place}" if place else ""
@@ -64,10 +61,29 @@ def as_vectors(name: str, values: ArrayLike) -> Floats:
         ShapeError: The last axis does not hold three components.
         NotFiniteError: A component is NaN or infinite.
     """
-    array = as_floats(name, values)
+    return as_floats(name, as_rows(name, values))
+
+
+def as_rows(name: str, values: ArrayLike) -> Floats:
+    """Return `values` as a float64 array of shape (..., 3), whose numbers are not looked at.
+
+    For those who come by the size of each vector anyway: what is wrong with one `as_vectors` or
+    `as_directions` tells.
+
+    Raises:
+        ShapeError: The last axis does not hold three components, or no numbers.
+    """
+    array = _as_numbers(name, values)
     if array.ndim == 0 or array.shape[-1] != 3:
         raise ShapeError(f"{name} must have shape (..., 3), got {array.shape}")
     return array
+
+
+def _as_numbers(name: str, values: ArrayLike) -> Floats:
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ShapeError(f"{name} must be an array of numbers: {error}") from None
 
 
 def one_direction(values: Any) -> tuple[float, float, float] | None:
@@ -96,8 +112,7 @@ def as_directions(name: str, values: ArrayLike) -> Floats:
         ZeroVectorError: A vector is zero; the error gives the first one's place.
     """
     array = as_vectors(name, values)
-    # Most often no component is zero, which is quicker to see than that no vector is.
-    zero = np.zeros(0, dtype=bool) if array.all() else ~array.any(axis=-1)
+    zero = ~array.any(axis=-1)
     if zero.any():
         place = tuple(int(i) for i in np.argwhere(zero)[0])
         where = f" at index {place}" if place else ""

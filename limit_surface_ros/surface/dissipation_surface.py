@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.checks import as_directions, one_direction
 from limit_surface_ros.surface.dissipation_terms import FormTerms
 from limit_surface_ros.surface.gauge_inverse import ConvexInverse
 from limit_surface_ros.surface.one_load import norm_gradient_of_one, one_load_terms
@@ -20,8 +19,6 @@ from limit_surface_ros.surface.sphere import even_directions, of_unit_length
 from limit_surface_ros.surface.tabulated_inverse import TabulatedInverse
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.surface.dissipation_terms import DissipationTerms
     from limit_surface_ros.surface.gauge_inverse import Inverse

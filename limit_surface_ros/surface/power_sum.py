@@ -23,6 +23,7 @@ from limit_surface_ros.surface.power_sum_scale import PowerScale, power_scale
 from limit_surface_ros.surface.quadratic_form import BLIND, as_psd_matrices, root_of
 from limit_surface_ros.surface.scaled_surface import ScaledSurface
 from limit_surface_ros.surface.scaling import Scaling
+from limit_surface_ros.surface.sphere import of_unit_length, squared_lengths
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -222,7 +223,7 @@ class PowerSum(ScaledSurface):
     def _twists_and_load_factors(self, loads: Floats) -> tuple[Floats, Floats]:
         images = self._images(loads)
         forms = self._forms(images, loads)
-        seen = forms.all()
+        seen = np.count_nonzero(forms) == forms.size
         if not seen and not forms.any(axis=0).all():
             unlimited = loads[:, ~forms.any(axis=0)][:, 0].tolist()
             raise RangeError(
@@ -239,9 +240,8 @@ class PowerSum(ScaledSurface):
         else:
             factors, weights = self._scale.load_factors_and_weights(forms)
             images *= weights[:, np.newaxis]
-        normals = self._stacked_roots.T @ images.reshape(-1, images.shape[2])
-        normals /= np.sqrt(_squared(normals))
-        return np.asarray(normals), factors
+        normals = self._stacked_roots.T.dot(images.reshape(-1, images.shape[2]))
+        return of_unit_length(normals), factors
 
     def _loads(self, twists: Floats) -> Floats:
         if len(self._free):
@@ -273,7 +273,7 @@ class PowerSum(ScaledSurface):
 
     def _images(self, columns: Floats) -> Floats:
         """Return R_i f, shape (k, 3, m), of columns (3, m)."""
-        return (self._stacked_roots @ columns).reshape(-1, 3, columns.shape[1])
+        return self._stacked_roots.dot(columns).reshape(-1, 3, columns.shape[1])
 
     @cached_property
     def _blind(self) -> Floats | None:
@@ -287,11 +287,5 @@ class PowerSum(ScaledSurface):
         """Return f' A_i f, shape (k, m), from the images R_i f and the loads f."""
         forms: Floats = np.einsum("kcm,kcm->km", images, images)
         if self._blind is not None:
-            forms[forms <= self._blind * _squared(loads)] = 0.0
+            forms[forms <= self._blind * squared_lengths(loads)] = 0.0
         return forms
-
-
-def _squared(columns: Floats) -> Floats:
-    """Return the squared lengths (m,) of columns (3, m)."""
-    x, y, z = columns
-    return np.asarray(x * x + y * y + z * z)

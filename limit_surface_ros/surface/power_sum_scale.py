@@ -1,8 +1,8 @@
 """The load factor g of a sum of powers, sum_i (q_i / g^2)^p_i = 1, and how each form weighs.
 
-With h_i = (q_i / g^2)^p_i the outward normal is the sum of the A_i f, each weighed by p_i h_i / q_i.
+With h_i = (q_i / g^2)^p_i the outward normal is the sum of the A_i f, weighed by p_i h_i / q_i.
 Exponents that are whole parts of a small n, as the thesis's are, need neither exp nor log: with
-r_i = q_i^(1/n) and m_i = n p_i the w = g^(2/n) is the root of a polynomial, sum_i (r_i / w)^m_i = 1.
+r_i = q_i^(1/n) and m_i = n p_i, w = g^(2/n) is the root of a polynomial, sum_i (r_i / w)^m_i = 1.
 """
 
 from __future__ import annotations
@@ -57,13 +57,13 @@ class PolynomialScale:
 
     def load_factors(self, forms: Floats) -> Floats:
         """Return g, shape (m,); 0 where every form is zero."""
-        return self._load_factors(self._root_of_equation(self._roots(forms)))
+        return self._load_factors(self._root_of_equation(forms, self._roots(forms)))
 
     def load_factors_and_weights(self, forms: Floats) -> tuple[Floats, Floats]:
         """Return g (m,) and weights m_i (w / r_i)^(n - m_i), shape (k, m)."""
         roots = self._roots(forms)
-        root = self._root_of_equation(roots)
-        if not roots.all():
+        root = self._root_of_equation(forms, roots)
+        if np.count_nonzero(roots) < roots.size:
             roots[roots == 0.0] = np.inf
         weights = np.divide(root, roots, out=roots)
         for weight, power in zip(weights, self._powers, strict=True):
@@ -94,18 +94,18 @@ class PolynomialScale:
             return root
         return np.asarray(root * (np.sqrt(root) if self._degree == 3 else root))
 
-    def _root_of_equation(self, roots: Floats) -> Floats:
+    def _root_of_equation(self, forms: Floats, roots: Floats) -> Floats:
         """Return w, shape (m,)."""
-        first, *others = self._coefficients(roots)
+        first, *others = self._coefficients(forms, roots)
         if not others:
             return first
         if self._degree == 2:
             return _larger_root(first, others[0])
         most = np.maximum.reduce(roots)
-        if not most.all():
+        if np.count_nonzero(most) < len(most):
             seen = most > 0.0
             root: Floats = np.zeros_like(most)
-            root[seen] = self._root_of_equation(roots[:, seen])
+            root[seen] = self._root_of_equation(forms[:, seen], roots[:, seen])
             return root
         # g is at least that of each form alone: dividing by that overestimates, and from beyond
         # the root Newton's method falls to it.
@@ -113,9 +113,10 @@ class PolynomialScale:
         for coefficient in others[-2::-1]:
             rest = coefficient + rest / most
         root = _larger_root(first, rest)
-        for _ in range(_MAX_STEPS):
+        for step in range(_MAX_STEPS):
             # The polynomial and its slope by Horner's rule.
-            value, slope = root - first, 2.0 * root - first
+            value = root - first
+            slope = root + value
             for coefficient in others[:-1]:
                 value *= root
                 value -= coefficient
@@ -124,22 +125,22 @@ class PolynomialScale:
             value *= root
             value -= others[-1]
             value /= slope
-            root = root - value
-            if not np.maximum.reduce(value / root, initial=0.0) > _LAST_STEP:
+            root -= value
+            # From this start n + 1 steps do, but for exponents that come more than once.
+            if step >= self._degree and not (value > _LAST_STEP * root).any():
                 break
         return root
 
-    def _coefficients(self, roots: Floats) -> list[Floats]:
+    def _coefficients(self, forms: Floats, roots: Floats) -> list[Floats]:
         """Return the sums c_m of the r_i^m_i with m_i = m, for m from 1 to n."""
         found: list[Floats | None] = [None] * self._degree
-        for root, power in zip(roots, self._powers, strict=True):
-            value = root
-            for _ in range(power - 1):
+        for form, root, power in zip(forms, roots, self._powers, strict=True):
+            value = form if power == self._degree else root
+            for _ in range(power - 1 if power < self._degree else 0):
                 value = value * root
             present = found[power - 1]
             found[power - 1] = value if present is None else present + value
-        zeros = np.zeros_like(roots[0])
-        return [zeros if each is None else each for each in found]
+        return [np.zeros(forms.shape[1]) if each is None else each for each in found]
 
 
 class LogarithmicScale:

@@ -13,7 +13,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
-from limit_surface_ros.checks import as_directions, as_positive, as_vectors, one_direction
+from limit_surface_ros.checks import (
+    as_directions,
+    as_positive,
+    as_rows,
+    as_vectors,
+    one_direction,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -120,9 +126,10 @@ class ScaledSurface(ABC):
             if factor is not None:
                 scalar: Floats = np.float64(factor)
                 return scalar
-        array = as_vectors("wrench", wrench)
+        array = as_rows("wrench", wrench)
         factors = np.empty(array.size // 3)
-        for block, columns, sizes in self._blocks(array, self.scaling.wrench_unit):
+        unit = self.scaling.wrench_unit
+        for block, columns, sizes in self._blocks("wrench", array, unit, zeros=True):
             np.multiply(self._load_factors(columns), sizes, out=factors[block])
         return factors.reshape(array.shape[:-1])[()]
 
@@ -146,8 +153,8 @@ class ScaledSurface(ABC):
             twist = self._twist_of_one(one)
             if twist is not None:
                 return np.array(twist)
-        array = as_directions("wrench", wrench)
-        return self._mapped(array, self.scaling.wrench_unit, self._twists, self.scaling.twist_unit)
+        unit_in, unit_out = self.scaling.wrench_unit, self.scaling.twist_unit
+        return self._mapped("wrench", wrench, unit_in, self._twists, unit_out)
 
     def twist_and_load_factor(self, wrench: ArrayLike) -> tuple[Floats, Floats]:
         """Direction of the incipient motion and load factor, for less than both cost apart.
@@ -168,12 +175,12 @@ class ScaledSurface(ABC):
             found = self._twist_and_load_factor_of_one(one)
             if found is not None:
                 return np.array(found[0]), np.float64(found[1])
-        array = as_directions("wrench", wrench)
+        array = as_rows("wrench", wrench)
         twists, factors = np.empty((array.size // 3, 3)), np.empty(array.size // 3)
-        for block, columns, sizes in self._blocks(array, self.scaling.wrench_unit):
+        for block, columns, sizes in self._blocks("wrench", array, self.scaling.wrench_unit):
             scaled_twists, scaled_factors = self._twists_and_load_factors(columns)
             np.multiply(scaled_factors, sizes, out=factors[block])
-            np.multiply(scaled_twists.T, self.scaling.twist_unit, out=twists[block])
+            _write(scaled_twists, self.scaling.twist_unit, twists[block])
         return twists.reshape(array.shape), factors.reshape(array.shape[:-1])[()]
 
     def wrench_of_twist(self, twist: ArrayLike) -> Floats:
@@ -196,31 +203,48 @@ class ScaledSurface(ABC):
             wrench = self._wrench_of_one(one)
             if wrench is not None:
                 return np.array(wrench)
-        array = as_directions("twist", twist)
-        return self._mapped(array, self.scaling.twist_unit, self._loads, self.scaling.wrench_unit)
+        unit_in, unit_out = self.scaling.twist_unit, self.scaling.wrench_unit
+        return self._mapped("twist", twist, unit_in, self._loads, unit_out)
 
     def _mapped(
-        self, array: Floats, unit_in: Floats, kernel: Callable[[Floats], Floats], unit_out: Floats
+        self,
+        name: str,
+        vectors: ArrayLike,
+        unit_in: Floats,
+        kernel: Callable[[Floats], Floats],
+        unit_out: Floats,
     ) -> Floats:
         """Map vectors (..., 3) through a kernel on scaled columns."""
+        array = as_rows(name, vectors)
         result = np.empty((array.size // 3, 3))
-        for block, columns, _ in self._blocks(array, unit_in):
-            np.multiply(kernel(columns).T, unit_out, out=result[block])
+        for block, columns, _ in self._blocks(name, array, unit_in):
+            _write(kernel(columns), unit_out, result[block])
         return result.reshape(array.shape)
 
-    def _blocks(self, array: Floats, unit: Floats) -> Iterator[tuple[slice, Floats, Floats]]:
+    def _blocks(
+        self, name: str, array: Floats, unit: Floats, *, zeros: bool = False
+    ) -> Iterator[tuple[slice, Floats, Floats]]:
         """Yield blocks of vectors (..., 3): a slice, scaled columns of size one, and their sizes.
 
-        The size is taken out first, so that no load overflows or vanishes on the way.
+        The size is taken out first, so that no load overflows or vanishes on the way. It also
+        tells, for less than a look at each number costs, whether all is well with a vector.
         """
         rows = array.reshape(-1, 3)
         count = self._block_columns
         for start in range(0, len(rows), count):
             block = slice(start, start + count)
-            columns = np.divide(rows[block].T, 1.0, order="C")
+            columns = rows[block].T.copy()
             sizes = np.maximum.reduce(np.abs(columns))
-            if not sizes.all():
+            # NaN fails the comparison.
+            if np.count_nonzero(sizes) < len(sizes) or not np.maximum.reduce(sizes) < np.inf:
+                (as_vectors if zeros else as_directions)(name, array)
                 sizes[sizes == 0.0] = 1.0
             columns /= sizes
             columns /= unit[:, np.newaxis]
             yield block, columns, sizes
+
+
+def _write(columns: Floats, unit: Floats, rows: Floats) -> None:
+    """Write scaled columns (3, m) into rows (m, 3), in physical units."""
+    # Along the columns: numpy is slow along rows of three.
+    np.multiply(columns, unit[:, np.newaxis], out=rows.T)

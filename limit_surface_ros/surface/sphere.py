@@ -9,6 +9,8 @@ import numpy as np
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
 
+_ONES = np.ones(3)
+
 
 def even_directions(count: int) -> Floats:
     """Return `count` unit vectors on a Fibonacci spiral, shape (count, 3).
@@ -24,4 +26,10 @@ def even_directions(count: int) -> Floats:
 
 def of_unit_length(columns: Floats) -> Floats:
     """Return vectors (3, m), none zero, divided by their lengths."""
-    return np.asarray(columns / np.sqrt((columns * columns).sum(axis=0)))
+    return np.asarray(columns / np.sqrt(squared_lengths(columns)))
+
+
+def squared_lengths(columns: Floats) -> Floats:
+    """Return the squared lengths (m,) of vectors (3, m)."""
+    # The quickest way for few and for many.
+    return _ONES.dot(columns * columns)
