@@ -13,12 +13,17 @@ _MUCH = 0.5
 
 
 def root_bracket(
-    function: Callable[[float], float], low: float, high: float, width: float, exact: float = 0.0
+    function: Callable[[float], float],
+    low: float,
+    high: float,
+    width: float,
+    exact: float = 0.0,
+    straight: float = 0.0,
 ) -> tuple[float, float]:
     """Return a narrow bracket of the place where a function that never falls changes its sign.
 
-    The Illinois method (Dowell and Jarratt 1971, doi:10.1007/BF01934364) with halves in between,
-    so that jumps and flat parts are met as well.
+    The method of Anderson and Bjoerck (1973, doi:10.1007/BF01951936) with halves in between, so
+    that jumps and flat parts are met as well.
 
     Args:
         function: Not above 0 at `low`, not below 0 at `high`.
@@ -26,13 +31,15 @@ def root_bracket(
         high: Upper end.
         width: Of a bracket that is narrow enough; 0 for the next number.
         exact: Size of a value that counts as 0.
+        straight: Product of the sizes of the values at both ends up to which who calls takes the
+            function for straight between them.
 
     Returns:
         Both ends; the same place twice if a value there counts as 0.
     """
-    below, above = function(low), function(high)
+    below, above = at_low, at_high = function(low), function(high)
     step, side, before, slow = 0, 0.0, float("inf"), False
-    while high - low > width:
+    while high - low > width and not (straight and -at_low * at_high <= straight):
         secant = not slow and below < 0.0 < above
         place = low + (below / (below - above) if secant else 0.5) * (high - low)
         if not low < place < high:
@@ -42,16 +49,26 @@ def root_bracket(
         value = function(place)
         if abs(value) <= exact:
             return place, place
-        # An end that stays for a second time counts half, so that the next secant moves it.
+        # An end that stays for a second time counts less, so that the next secant moves it.
         if value < 0.0:
-            above *= 0.5 if side < 0.0 else 1.0
-            low, below = place, value
+            if side < 0.0:
+                above *= _less(value / below)
+            low, below, at_low = place, value, value
         else:
-            below *= 0.5 if side > 0.0 else 1.0
-            high, above = place, value
+            if side > 0.0:
+                below *= _less(value / above)
+            high, above, at_high = place, value, value
         side = value
         step += 1
         slow = False
         if step % _LOOK == 0:
             slow, before = abs(value) > _MUCH * before, abs(value)
     return low, high
+
+
+def _less(fallen: float) -> float:
+    """Return for how much an end counts beside the other, which has fallen to a part of itself.
+
+    So much that a parabola through the last three places would be met.
+    """
+    return 1.0 - fallen if fallen < 1.0 else 0.5

@@ -17,6 +17,7 @@ import numpy as np
 from limit_surface_ros.checks import as_floats
 from limit_surface_ros.decay.level_search import LevelSearch
 from limit_surface_ros.errors import NotFiniteError, RangeError, ShapeError, UnstableError
+from limit_surface_ros.scratch import keep_scratch
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 # exp(-VANISHED) is zero in double precision.
 VANISHED = 800.0
 # Exponentials that are evaluated at a time.
-BLOCK = 1 << 18
+BLOCK = 1 << 15
 
 
 def as_rates(rates: ArrayLike) -> Complexes:
@@ -265,6 +266,7 @@ class ExponentialSum:
 
     def _at(self, times: Floats) -> Floats:
         flat = times.reshape(-1)
+        keep_scratch(flat.size)
         values = np.empty(flat.shape)
         slowest = self.slowest_rate
         # All is zero by then; at 1e308 s, exp would make NaN of an infinite phase.

@@ -64,8 +64,14 @@ def gauge_of_one(terms: Sequence[Term], load: Vector) -> float | None:
     return None if t is None else exp(-t)
 
 
+def is_plain(load: Vector) -> bool:
+    """Return whether no square of a load of this size runs out of numbers."""
+    x, y, z = load
+    return _TINY < x * x + y * y + z * z < _HUGE
+
+
 def norm_of_one(terms: Sequence[Term], load: Vector) -> float:
-    """Return the sum of the terms' norms |R_i f|, whatever their exponents."""
+    """Return the sum of the terms' norms |R_i f|, whatever their exponents, for a plain load."""
     x, y, z = load
     total = 0.0
     for _, _, a, b, c, d, e, f, g, h, i in terms:
@@ -97,8 +103,11 @@ def norm_gradient_of_one(terms: Sequence[Term], load: Vector) -> Vector | None:
     return gx, gy, gz
 
 
-def normal_of_one(terms: Sequence[Term], load: Vector) -> Vector | None:
-    """Return the gradient of H, of any length, where the load's ray leaves the surface."""
+def normal_and_gauge_of_one(terms: Sequence[Term], load: Vector) -> tuple[Vector, float] | None:
+    """Return the gradient of H, of any length, where the load's ray leaves the surface.
+
+    Beside it goes the load factor.
+    """
     x, y, z = load
     size = x * x + y * y + z * z
     if not _TINY < size < _HUGE:
@@ -124,7 +133,7 @@ def normal_of_one(terms: Sequence[Term], load: Vector) -> Vector | None:
         gx += s * px
         gy += s * py
         gz += s * pz
-    return gx, gy, gz
+    return (gx, gy, gz), exp(-t)
 
 
 def log_scale_of_one(terms: Sequence[Term], forms: list[float]) -> float | None:

@@ -13,8 +13,10 @@ from limit_surface_ros.checks import as_floats, as_vectors
 from limit_surface_ros.errors import RangeError, ShapeError
 from limit_surface_ros.surface.one_load import (
     gauge_of_one,
+    is_plain,
     norm_gradient_of_one,
-    normal_of_one,
+    norm_of_one,
+    normal_and_gauge_of_one,
     one_load_terms,
 )
 from limit_surface_ros.surface.one_twist import most_power_of_one
@@ -179,20 +181,30 @@ class PowerSum(ScaledSurface):
         return self._roots.reshape(-1, 3)
 
     def _load_factor_of_one(self, wrench: Vector) -> float | None:
+        if self._is_norm and is_plain(wrench):
+            return norm_of_one(self._one_load_terms, wrench)
         return gauge_of_one(self._one_load_terms, wrench)
 
     def _twist_of_one(self, wrench: Vector) -> Vector | None:
+        found = self._twist_and_load_factor_of_one(wrench)
+        return None if found is None else found[0]
+
+    def _twist_and_load_factor_of_one(self, wrench: Vector) -> tuple[Vector, float] | None:
         # The terms take physical wrenches, so that the normal comes as a physical twist.
         if self._is_norm:
-            normal = norm_gradient_of_one(self._one_load_terms, wrench)
+            gradient = norm_gradient_of_one(self._one_load_terms, wrench)
+            if gradient is None:
+                return None
+            x, y, z = gradient
+            factor = x * wrench[0] + y * wrench[1] + z * wrench[2]
         else:
-            normal = normal_of_one(self._one_load_terms, wrench)
-        if normal is None:
-            return None
-        x, y, z = normal
+            found = normal_and_gauge_of_one(self._one_load_terms, wrench)
+            if found is None:
+                return None
+            (x, y, z), factor = found
         turn = z * self.scaling.characteristic_length
         length = sqrt(x * x + y * y + turn * turn)
-        return x / length, y / length, z / length
+        return (x / length, y / length, z / length), factor
 
     @cached_property
     def _scaled_terms(self) -> list[Term]:

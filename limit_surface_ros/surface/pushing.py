@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
-from math import atan, atan2, cos, hypot, sin
+from math import hypot
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
@@ -31,9 +31,11 @@ if TYPE_CHECKING:
 # Width of a bracket of directions [rad], or part of the range of turning rates, that is as good as
 # one of them.
 _WIDTH = 1e-13
-# Error of the velocity's direction at the contact [rad], or of the moment about it in parts of the
-# moment scale, that counts as none.
+# Error of the direction of the velocity at the contact, in parts of the way between the edges, or
+# of the moment about it, in parts of the moment scale, that counts as none.
 _EXACT = 1e-10
+# Product of two such errors between which what is straight in them is as good.
+_STRAIGHT = 1e-12
 # Sine between two velocities below which they count as one direction.
 _PARALLEL = 1e-12
 # A body that turns freely about its contact needs no turning rate, however large.
@@ -99,7 +101,7 @@ def motion_cone(
     contact = _Contact(surface, point, normal, friction)
     edges = contact.edge(-1.0), contact.edge(1.0)
     return MotionCone(
-        np.array([contact.wrench(edge.angle, edge.twist) for edge in edges]),
+        np.array([contact.wrench(edge.force, edge.twist) for edge in edges]),
         np.array([edge.twist for edge in edges]),
         np.array([edge.velocity for edge in edges]),
     )
@@ -140,24 +142,24 @@ def push(
         return found
     edge, mode = found
     speed = approach / _product(edge.velocity, contact.normal)
-    return Push(speed * edge.twist, mode, contact.wrench(edge.angle, edge.twist))
+    return Push(speed * edge.twist, mode, contact.wrench(edge.force, edge.twist))
 
 
 class _Response(NamedTuple):
-    """What a force causes: its angle, the twist, and velocity and heading at the contact."""
+    """What a force causes: the twist, and the velocity at the contact."""
 
-    angle: float
+    force: _Pair
     twist: Floats
-    velocity: tuple[float, float]
-    heading: float
+    velocity: _Pair
 
 
+_Pair: TypeAlias = "tuple[float, float]"
 # A sticking push, or the edge of the friction cone along which the pusher slides, and how.
 _Outcome: TypeAlias = "Push | tuple[_Response, ContactMode]"
 
 
 class _Contact:
-    """A contact point with its friction cone; directions are angles from the inward normal."""
+    """A contact point with its friction cone."""
 
     def __init__(
         self, surface: LimitSurface, point: ArrayLike, normal: ArrayLike, friction: float
@@ -171,40 +173,53 @@ class _Contact:
             raise RangeError(f"friction must be a finite number from 0 on, got {friction}")
         length = hypot(nx, ny)
         self.normal = nx / length, ny / length
-        self._half_angle = atan(friction)
+        self._friction = friction
+        # Of the edges' unit forces, along the normal and to its left.
+        self._along = 1.0 / hypot(1.0, friction)
+        self._across = friction * self._along
 
     def edge(self, side: float) -> _Response:
         """Return what the force along the left (1) or right (-1) edge of the cone causes."""
-        return self._respond(side * self._half_angle)
+        nx, ny = self.normal
+        across = side * self._across
+        return self._respond((self._along * nx - across * ny, self._along * ny + across * nx))
 
-    def stick_by_force(self, velocity: tuple[float, float]) -> _Outcome:
+    def stick_by_force(self, velocity: _Pair) -> _Outcome:
         """Find the force within the cone for which the body follows the pusher.
 
-        The velocity that a force causes at the contact turns with the force, so that a bracket
-        of directions shrinks to the answer. Where the load is at a corner of the surface its
-        twists fill a cone: the answer is the sum of its edges that has the pusher's velocity.
+        The velocity that a force causes at the contact turns with the force. Both are looked at
+        as shares of their ways between the edges, measured so that the shares would be the same
+        were the surface an ellipsoid: a bracket of them shrinks to the answer in few steps. Where
+        the load is at a corner of the surface its twists fill a cone: the answer is the sum of
+        its edges that has the pusher's velocity.
         """
-        respond = cache(self._respond)
-        right, left = respond(-self._half_angle), respond(self._half_angle)
-        heading = self._angle_of(velocity)
-        if heading > left.heading:
+        right, left = self.edge(-1.0), self.edge(1.0)
+        if _turn(left.velocity, velocity) > 0.0:
             return left, ContactMode.SLIDE_LEFT
-        if heading < right.heading:
+        if _turn(right.velocity, velocity) < 0.0:
             return right, ContactMode.SLIDE_RIGHT
-        ends = root_bracket(
-            lambda angle: respond(angle).heading - heading,
-            right.angle,
-            left.angle,
-            _WIDTH,
-            _EXACT,
-        )
-        low, high = map(respond, ends)
-        twist = _sum_with_velocity(low, high, velocity)
-        return Push(twist, ContactMode.STICK, self.wrench(0.5 * (low.angle + high.angle), twist))
+        responses = {0.0: right, 1.0: left}
+        first = _matched(right, left)
+        wanted = _share(velocity, first, left.velocity)
 
-    def stick_by_turning(
-        self, surface: DissipationSurface, velocity: tuple[float, float]
-    ) -> _Outcome:
+        def error(share: float) -> float:
+            if share not in responses:
+                rest = 1.0 - share
+                (ax, ay), (bx, by) = right.force, left.force
+                responses[share] = self._respond((rest * ax + share * bx, rest * ay + share * by))
+            return _share(responses[share].velocity, first, left.velocity) - wanted
+
+        ends = root_bracket(error, 0.0, 1.0, _WIDTH, _EXACT, _STRAIGHT)
+        low, high = (responses[end] for end in ends)
+        twist, shares = _sum_with_velocity(low, high, velocity)
+        total = sum(shares)
+        force = (
+            (shares[0] * low.force[0] + shares[1] * high.force[0]) / total,
+            (shares[0] * low.force[1] + shares[1] * high.force[1]) / total,
+        )
+        return Push(twist, ContactMode.STICK, self.wrench(force, twist))
+
+    def stick_by_turning(self, surface: DissipationSurface, velocity: _Pair) -> _Outcome:
         """Find the motion of least dissipation in which the body follows the pusher.
 
         The moment about the contact of the load that a turning rate needs rises with the rate,
@@ -229,46 +244,63 @@ class _Contact:
             if moment(-reach) <= 0.0 <= moment(reach):
                 break
             reach *= 2.0
-        exact = _EXACT * float(surface.scaling.wrench_unit[2])
-        low, high = root_bracket(moment, -reach, reach, _WIDTH * reach, exact)
+        unit = float(surface.scaling.wrench_unit[2])
+        low, high = root_bracket(
+            moment, -reach, reach, _WIDTH * reach, _EXACT * unit, _STRAIGHT * unit * unit
+        )
         below, above = moment(low), moment(high)
         share = below / (below - above) if below < 0.0 < above else 0.5
         wrench = (1.0 - share) * load(low) + share * load(high)
-        angle = self._angle_of((wrench[0], wrench[1]))
-        if angle > self._half_angle:
-            return self.edge(1.0), ContactMode.SLIDE_LEFT
-        if angle < -self._half_angle:
+        fx, fy, _ = wrench.tolist()
+        across = _turn(self.normal, (fx, fy))
+        if abs(across) > self._friction * _product(self.normal, (fx, fy)):
+            if across > 0.0:
+                return self.edge(1.0), ContactMode.SLIDE_LEFT
             return self.edge(-1.0), ContactMode.SLIDE_RIGHT
-        return Push(np.array(motion(0.5 * (low + high))), ContactMode.STICK, wrench)
+        rate = (1.0 - share) * low + share * high
+        return Push(np.array(motion(rate)), ContactMode.STICK, wrench)
 
-    def wrench(self, angle: float, twist: Floats) -> Floats:
-        """Return the wrench on the surface (3,) of a force at an angle that causes a twist."""
-        load = self._load(angle)
+    def wrench(self, force: _Pair, twist: Floats) -> Floats:
+        """Return the wrench on the surface (3,) along a force that causes a twist."""
+        load = self._load(force)
         factor = self._surface.load_factor(load)
         # Beside a single support point a body turns freely under any force, however small: the
         # twist alone says which one it needs.
         return np.array(load) / factor if factor < np.inf else self._surface.wrench_of_twist(twist)
 
-    def _respond(self, angle: float) -> _Response:
-        twist = self._surface.twist_of_wrench(self._load(angle))
+    def _respond(self, force: _Pair) -> _Response:
+        twist = self._surface.twist_of_wrench(self._load(force))
         vx, vy, omega = twist.tolist()
-        velocity = vx - omega * self._y, vy + omega * self._x
-        return _Response(angle, twist, velocity, self._angle_of(velocity))
+        return _Response(force, twist, (vx - omega * self._y, vy + omega * self._x))
 
-    def _load(self, angle: float) -> tuple[float, float, float]:
-        """Return the wrench of a unit force through the contact."""
-        nx, ny = self.normal
-        fx = nx * cos(angle) - ny * sin(angle)
-        fy = ny * cos(angle) + nx * sin(angle)
+    def _load(self, force: _Pair) -> tuple[float, float, float]:
+        """Return the wrench of a force through the contact."""
+        fx, fy = force
         return fx, fy, self._x * fy - self._y * fx
 
-    def _angle_of(self, vector: tuple[float, float]) -> float:
-        """Return the angle [rad] of a planar vector, counter-clockwise from the normal."""
-        return atan2(_turn(self.normal, vector), _product(self.normal, vector))
+
+def _matched(right: _Response, left: _Response) -> _Pair:
+    """Return the right edge's velocity, as long beside the left one's as on an ellipsoid.
+
+    There velocities are M f with a symmetric M, so that f_left . v_right = f_right . v_left.
+    """
+    ours, theirs = _product(left.force, right.velocity), _product(right.force, left.velocity)
+    length = theirs / ours if ours * theirs > 0.0 else 1.0
+    return length * right.velocity[0], length * right.velocity[1]
 
 
-def _sum_with_velocity(low: _Response, high: _Response, velocity: tuple[float, float]) -> Floats:
-    """Return the sum of two neighbouring motions, with factors, that has a velocity."""
+def _share(velocity: _Pair, right: _Pair, left: _Pair) -> float:
+    """Return the s for which a velocity is along (1 - s) right + s left."""
+    beyond_right, before_left = _turn(right, velocity), _turn(velocity, left)
+    total = beyond_right + before_left
+    # Right and left may be one direction, and a bent surface may lead beyond them.
+    return beyond_right / total if total > 0.0 else 0.5
+
+
+def _sum_with_velocity(
+    low: _Response, high: _Response, velocity: _Pair
+) -> tuple[Floats, tuple[float, float]]:
+    """Return the sum of two neighbouring motions that has a velocity, and their factors."""
     turn = _turn(low.velocity, high.velocity)
     if abs(turn) > _PARALLEL * hypot(*low.velocity) * hypot(*high.velocity):
         first = _turn(velocity, high.velocity) / turn
@@ -277,18 +309,23 @@ def _sum_with_velocity(low: _Response, high: _Response, velocity: tuple[float, f
         square = _product(velocity, velocity)
         first = 0.5 * square / _product(velocity, low.velocity)
         second = 0.5 * square / _product(velocity, high.velocity)
-    return first * low.twist + second * high.twist
+    return first * low.twist + second * high.twist, (first, second)
 
 
-def _turn(a: tuple[float, float], b: tuple[float, float]) -> float:
+def _turn(a: _Pair, b: _Pair) -> float:
     return a[0] * b[1] - a[1] * b[0]
 
 
-def _product(a: tuple[float, float], b: tuple[float, float]) -> float:
+def _product(a: _Pair, b: _Pair) -> float:
     return a[0] * b[0] + a[1] * b[1]
 
 
-def _pair(name: str, values: ArrayLike) -> tuple[float, float]:
+def _pair(name: str, values: ArrayLike) -> _Pair:
+    if type(values) in (list, tuple) and len(values) == 2:
+        x, y = values
+        # The quick way for plain numbers; NaN and infinity fail the comparison.
+        if type(x) is type(y) is float and abs(x) + abs(y) < float("inf"):
+            return x, y
     pair = as_floats(name, values)
     if pair.shape != (2,):
         raise ShapeError(f"{name} must have shape (2,), got {pair.shape}")

@@ -20,6 +20,7 @@ from limit_surface_ros.checks import (
     as_vectors,
     one_direction,
 )
+from limit_surface_ros.scratch import keep_scratch
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -231,6 +232,7 @@ class ScaledSurface(ABC):
         """
         rows = array.reshape(-1, 3)
         count = self._block_columns
+        keep_scratch(len(rows))
         for start in range(0, len(rows), count):
             block = slice(start, start + count)
             columns = rows[block].T.copy()
