@@ -153,6 +153,16 @@ class ExponentialSum:
         """Largest real part of the rates [1/s]; below 0 if x decays."""
         return float(self.rates.real.max())
 
+    @cached_property
+    def start(self) -> float:
+        """x(0), in the unit of x."""
+        return float(self.coefficients.real.sum())
+
+    @cached_property
+    def size(self) -> float:
+        """Sum of the |c|, above which |x| never is, in the unit of x."""
+        return float(np.abs(self.coefficients).sum())
+
     def __call__(self, times: ArrayLike) -> Floats:
         """Return x at one time or many.
 

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 # Cells into which an interval is cut at each level of the search.
 _CELLS = 128
+# Intervals whose cells are kept, a few kilobytes each.
+_KEPT = 256
 # Part of the whole interval to which a time is found.
 _RESOLUTION = 1e-15
 # Phase in a cell from which on a term is as good as vanished in the next.
@@ -34,8 +36,8 @@ class LevelSearch:
         self._x = x
         # Times, each twice the one before, and sum |c| exp(Re lambda t), as far as asked for.
         self._envelope: list[tuple[float, float]] = []
-        # Cells of [0, end] by the ends that levels led to: these are few.
-        self._whole: dict[float, _Cells] = {}
+        # Cells of the intervals that levels led to: alike levels lead to the same ones.
+        self._known: dict[tuple[float, float], _Cells] = {}
 
     def last_excess(self, level: float) -> float | None:
         """Return the last time [s] at which |x| exceeds a level above 0, None if it never does."""
@@ -62,12 +64,7 @@ class LevelSearch:
         self, start: float, end: float, level: float, resolution: float
     ) -> float | None:
         """Return the last time in [start, end] at which |x| exceeds a level, if there is one."""
-        if start > 0.0:
-            cells = self._cells(start, end)
-        else:
-            if end not in self._whole:
-                self._whole[end] = self._cells(start, end)
-            cells = self._whole[end]
+        cells = self._cells(start, end)
         width = (end - start) / _CELLS
         for cell in np.flatnonzero(cells.highest > level)[::-1].tolist():
             left, right = cells.times[cell : cell + 2].tolist()
@@ -86,6 +83,15 @@ class LevelSearch:
         return None
 
     def _cells(self, start: float, end: float) -> _Cells:
+        known = self._known.get((start, end))
+        if known is None:
+            known = self._cells_anew(start, end)
+            if len(self._known) == _KEPT:
+                self._known.clear()
+            self._known[start, end] = known
+        return known
+
+    def _cells_anew(self, start: float, end: float) -> _Cells:
         times = np.linspace(start, end, _CELLS + 1)
         width = (end - start) / _CELLS
         values = np.abs(self._x(times))

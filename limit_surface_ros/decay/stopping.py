@@ -49,12 +49,11 @@ def onset_value(x: ExponentialSum) -> float:
     Raises:
         NoOnsetError: x(0) is zero, so that x(t) / x(0) has no meaning.
     """
-    start = float(x(0.0))
-    if not abs(start) > SMALLEST_START * float(np.abs(x.coefficients).sum()):
+    if not abs(x.start) > SMALLEST_START * x.size:
         raise NoOnsetError(
-            f"the decay model starts at x(0) = {start:g}: it cannot be scaled to an onset"
+            f"the decay model starts at x(0) = {x.start:g}: it cannot be scaled to an onset"
         )
-    return start
+    return x.start
 
 
 def predict_stop(x: ExponentialSum, load_factor: float, max_error: float = 0.0) -> Stop:

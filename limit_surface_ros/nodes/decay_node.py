@@ -262,7 +262,8 @@ class DecayNode(ModelNode[DecayModel]):
     def _predict_stop(self, request: PredictStop.Request, response: PredictStop.Response) -> None:
         model, body = self.models[request.model], self._surfaces[request.surface]
         load = self._inputs.wrench(body, request.wrench)
-        factor = float(load.surface.load_factor(load.vector))
+        twist, load_factor = load.surface.twist_and_load_factor(load.vector)
+        factor = float(load_factor)
         stop = predict_stop(model.sum, factor, model.max_error)
         times = np.linspace(
             0.0, max(self.values["horizon"], stop.time), self.values["forecast_points"]
@@ -272,7 +273,7 @@ class DecayNode(ModelNode[DecayModel]):
         response.stop_time = stop.time
         response.earliest_stop_time = stop.earliest
         response.latest_stop_time = stop.latest
-        convert.fill_twist(response.twist.twist, load.surface.twist_of_wrench(load.vector))
+        convert.fill_twist(response.twist.twist, twist)
         response.twist.header.stamp = request.wrench.header.stamp
         response.twist.header.frame_id = body.frame_id
         response.times = convert.flat_of(times)

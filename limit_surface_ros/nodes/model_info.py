@@ -70,7 +70,7 @@ def decay_info(model: DecayModel, is_default: bool) -> DecayInfo:
     return DecayInfo(
         name=model.name,
         terms=model.sum.terms,
-        onset_value=float(model.sum(0.0)),
+        onset_value=model.sum.start,
         slowest_rate=model.sum.slowest_rate,
         bound=model.max_error,
         bound_from=model.time_span[0],
