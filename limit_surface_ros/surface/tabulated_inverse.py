@@ -13,31 +13,36 @@ tell the best. There a cell of the table is read only if one sheet of the surfac
 
 from __future__ import annotations
 
+from math import factorial
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
+from limit_surface_ros.surface.sphere import squared_lengths
 
+if TYPE_CHECKING:
     from limit_surface_ros.checks import Bools, Floats, Places
     from limit_surface_ros.surface.gauge_inverse import Inverse
 
 # Cells of the table along each axis of the chart.
 _CELLS = 80
-# Powers of x and y in a cell's polynomial, y by y for each power of x.
+# Powers of x and y in a cell's polynomial, those of y one after the other for each of x.
 _DEGREE = 5
 _POWERS = [(i, j) for i in range(_DEGREE + 1) for j in range(_DEGREE + 1 - i)]
+# Derivatives along x and y of what is read: the height, its slopes and its bends.
+_ORDERS = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
 # Vectors after which a table is made: as many as it takes to make one.
 _WORTH = (2 * _CELLS + 1) ** 2
 # Steps along the curvature until a point counts as hard.
 _STEPS = 6
-# Length in the chart of a step that proves the point in any cell, and in none: the square of the
-# latter is how far from the surface a step leads.
-_SHORT_STEP, _LONG_STEP = 1e-10, 1e-6
-# Between these a step is the last if it leaves an error below this, the error being the part of a
-# step that is known of the cell. That part is met in few places, so that more is taken.
-_ERROR = 1e-11
+# Lengths in the chart of steps that prove a point in any cell, and in none.
+_SHORT_STEP, _LONG_STEP = 1e-10, 1e-5
+# Between these a step is the last if it leaves errors below these: in the chart, which is the part
+# of a step that is known of the cell, and off the surface, which grows with a step's square. Both
+# are known of few places in a cell, so that more is taken.
+_ERROR = 3e-11
+_OFF = 1e-12
+_ROUNDING = 1e-15
 _MORE = 4.0
 # Part of a surface's size by which points of one sheet differ at most, found in two ways.
 _SAME = 1e-9
@@ -144,26 +149,28 @@ class SupportTable:
 
     def points(self, normals: Floats) -> tuple[Floats, Bools]:
         """Return points (3, m) for vectors (3, m), none zero, and which are certain (m,)."""
-        sign = np.where(normals[2] < 0.0, -1.0, 1.0)
+        sign = np.copysign(1.0, normals[2])
         place = _chart(normals * sign)
-        cell = _cell(place)
+        cell, within = _cells_of(place)
         certain = self._useful.take(cell)
         # What runs out of digits or numbers on the way ends as not certain.
         with np.errstate(all="ignore"):
             if certain.all():
-                points, certain = self._prove(place, cell)
+                points, certain = self._prove(place, cell, within)
             else:
                 points = np.zeros_like(normals)
                 some = np.flatnonzero(certain)
                 if len(some):
-                    found = self._prove(place.take(some, axis=1), cell.take(some))
+                    found = self._prove(
+                        place.take(some, axis=1), cell.take(some), within.take(some, axis=1)
+                    )
                     points[:, some], certain[some] = found
         points *= sign
         return points, certain
 
-    def _prove(self, place: Floats, cell: Places) -> tuple[Floats, Bools]:
-        """Return points (3, m) for places (2, m) in the cells (m,), and which are certain (m,)."""
-        points, local = self._read(place, cell)
+    def _prove(self, place: Floats, cell: Places, within: Floats) -> tuple[Floats, Bools]:
+        """Return points (3, m) for places (2, m) in cells (m,), and which are certain (m,)."""
+        points, local = self._read(place, cell, within)
         points, away = self._step(points, place, local)
         last_step = self._last_step.take(cell)
         certain = away <= last_step
@@ -183,10 +190,14 @@ class SupportTable:
         """Return how long a last step may be (m,), by what one leaves at normals (3, m)."""
         place = _chart(normals)
         with np.errstate(all="ignore"):
-            points, local = self._read(place, _cell(place))
+            points, local = self._read(place, *_cells_of(place))
             points, first = self._step(points, place, local)
+            values, _ = self._gauge.values_and_normals(points)
             _, second = self._step(points, place, local)
-            allowed = _ERROR / _MORE * first / second
+            straight = _ERROR / _MORE * first / second
+            off = np.maximum(np.abs(values - 1.0) - _ROUNDING, 0.0)
+            near = first * np.sqrt(_OFF / _MORE / off)
+            allowed = np.minimum(straight, near)
         # NaN, of a step from nowhere, is a hard place.
         allowed[~(allowed > _SHORT_STEP)] = _SHORT_STEP
         return np.asarray(np.minimum(allowed, _LONG_STEP))
@@ -212,41 +223,68 @@ class SupportTable:
         points[2] += rise
         return points, np.maximum(*np.abs(away))
 
-    def _read(self, place: Floats, cell: Places) -> tuple[Floats, Floats]:
-        """Return points (3, m) at places (2, m) in the cells (m,), and what is there (6, m).
+    def _read(self, place: Floats, cell: Places, within: Floats) -> tuple[Floats, Floats]:
+        """Return points (3, m) at places (2, m), and what is there (6, m).
 
         That is a, b, 2 / (1 + a^2 + b^2), h_aa, h_ab and h_bb, in single precision.
+
+        Args:
+            place: On the chart.
+            cell: Numbers of the cells there, shape (m,).
+            within: The places within these, from -1 to 1, shape (2, m).
         """
-        x, y = (
-            (_CELLS * (at + 1.0) - (2 * index + 1)).astype(np.float32)
-            for at, index in zip(place, np.divmod(cell, _CELLS), strict=True)
-        )
-        read = iter(self._coefficients.take(cell, axis=1))
-        in_y = [[next(read) for _ in range(_DEGREE + 1 - i)] for i in range(_DEGREE + 1)]
-        value = [_polynomial(each, y) for each in in_y]
-        in_y = [_derivative(each) for each in in_y[:-1]]
-        slope = [_polynomial(each, y) for each in in_y]
-        bend = [_polynomial(_derivative(each), y) for each in in_y[:-1]]
-        in_x = _derivative(value)
         local: Any = np.empty((6, len(cell)), dtype=np.float32)
-        local[:2] = a, b = place
-        lift = 2.0 / (1.0 + a * a + b * b)
-        local[2] = lift
-        local[3] = _polynomial(_derivative(in_x), x)
-        local[4] = _polynomial(_derivative(slope), x)
-        local[5] = _polynomial(bend, x)
-        local[3:] *= _CELLS**2
-        height, slope_a, slope_b = (_polynomial(each, x) for each in (value, in_x, slope))
-        slope_a *= _CELLS
-        slope_b *= _CELLS
+        local[:2] = place
+        a, b, lift = local[:3]
+        np.divide(2.0, a * a + b * b + np.float32(1.0), out=lift)
+        (height, slope_a, slope_b), local[3:] = self._derivatives(cell, within)
         z = lift * (height - a * slope_a - b * slope_b)
-        return np.array([slope_a + a * z, slope_b + b * z, z]), local
+        points: Floats = np.empty((3, len(cell)))
+        np.add(slope_a, a * z, out=points[0])
+        np.add(slope_b, b * z, out=points[1])
+        points[2] = z
+        return points, local
+
+    def _derivatives(self, cell: Places, within: Floats) -> tuple[Any, Any]:
+        """Return h, h_a, h_b (3, m) and h_aa, h_ab, h_bb (3, m) at places within cells.
+
+        A polynomial that holds its own derivatives at the middle of the cell has those elsewhere
+        as sums of the same products, but of later coefficients.
+        """
+        powers: Any = np.empty((_DEGREE + 1, 2, len(cell)), dtype=np.float32)
+        powers[0] = 1.0
+        powers[1] = within
+        for power in range(2, _DEGREE + 1):
+            np.multiply(powers[power - 1], powers[1], out=powers[power])
+            powers[power] *= 1.0 / power
+        in_a, in_b = powers[:, 0], powers[:, 1]
+        read = self._coefficients.take(cell, axis=1)
+        # For each power of a, the sums over powers of b, of the first and second derivative, too.
+        sums: Any = np.empty((3, _DEGREE + 1, len(cell)), dtype=np.float32)
+        row = 0
+        for power in range(_DEGREE + 1):
+            count = _DEGREE + 1 - power
+            for order in range(min(3, count)):
+                _sum_of_products(
+                    read[row + order : row + count], in_b[: count - order], sums[order, power]
+                )
+            row += count
+        found: Any = np.empty((2, 3, len(cell)), dtype=np.float32)
+        for place_of, (order_a, order_b) in zip(found.reshape(6, -1), _ORDERS, strict=True):
+            last = _DEGREE + 1 - order_b
+            _sum_of_products(sums[order_b, order_a:last], in_a[: last - order_a], place_of)
+        found[0, 1:] *= _CELLS
+        found[1] *= _CELLS**2
+        return found
 
 
-def _cell(place: Floats) -> Places:
-    """Return the numbers (m,) of the cells of places (2, m)."""
-    row, column = np.minimum((0.5 * _CELLS * (place + 1.0)).astype(np.intp), _CELLS - 1)
-    return row * _CELLS + column
+def _cells_of(place: Floats) -> tuple[Places, Floats]:
+    """Return the cells' numbers (m,) of places (2, m), and where within these they are (2, m)."""
+    count = (0.5 * _CELLS) * (place + 1.0)
+    index = np.minimum(count.astype(np.intp), _CELLS - 1)
+    count -= index
+    row, column = index
+    return row * _CELLS + column, 2.0 * count - 1.0
 
 
 def _grid(ticks: Floats) -> Floats:
@@ -262,27 +300,14 @@ def _normals(places: Floats) -> Floats:
 
 def _chart(normals: Floats) -> Floats:
     """Return (a, b), shape (2, m), of normals (3, m) that are not (0, 0, -1)."""
-    x, y, z = normals
-    stretch = np.sqrt(x * x + y * y + z * z)
-    stretch += z
+    stretch = np.sqrt(squared_lengths(normals))
+    stretch += normals[2]
     return np.asarray(normals[:2] / stretch)
 
 
-def _polynomial(coefficients: Sequence[Floats], x: Floats) -> Floats:
-    """Return c_0 + c_1 x + c_2 x^2 + ... (m,), by Horner's rule."""
-    *lower, value = coefficients
-    if lower:
-        value = value * x
-    for coefficient in reversed(lower[1:]):
-        value += coefficient
-        value *= x
-    return value + lower[0] if lower else value
-
-
-def _derivative(coefficients: Sequence[Floats]) -> list[Floats]:
-    """Return the coefficients of a polynomial's derivative."""
-    _, first, *others = coefficients
-    return [first, *(power * each for power, each in enumerate(others, 2))]
+def _sum_of_products(first: Floats, second: Floats, out: Floats) -> None:
+    """Write the sums (m,) of products of rows (k, m) with rows (k, m)."""
+    np.einsum("km,km->m", first, second, out=out)
 
 
 def _of_cells(middles: Bools) -> Bools:
@@ -299,7 +324,8 @@ def _quintics(samples: Floats) -> tuple[Floats, Floats]:
             corners and middles, shape (3, 2 n + 1, 2 n + 1).
 
     Returns:
-        Coefficients, shape (21, cells), and the largest error at the nine points, shape (cells,).
+        The polynomials' derivatives in the cells' middles, shape (21, cells), and the largest
+        error at the nine points, shape (cells,).
     """
     i, j = np.array(_POWERS).T
     x, y = _grid(np.array([-1.0, 0.0, 1.0]))[:, :, np.newaxis]
@@ -316,4 +342,6 @@ def _quintics(samples: Floats) -> tuple[Floats, Floats]:
         ]
     )
     coefficients = np.linalg.pinv(model) @ data
-    return coefficients, np.abs(model @ coefficients - data).max(axis=0)
+    misfit = np.abs(model @ coefficients - data).max(axis=0)
+    factorials = np.array([[factorial(i) * factorial(j)] for i, j in _POWERS])
+    return factorials * coefficients, misfit
