@@ -131,16 +131,20 @@ class PointTerms:
 
     def gradient(self, twists: Floats) -> Floats:
         """Return the gradient (3, m) of D; a point at rest adds nothing."""
-        columns = twists.shape[1]
-        loads = []
-        for part in self._parts(columns):
-            velocities = self._jacobians[:, part].reshape(-1, 3) @ twists
-            velocities = velocities.reshape(2, -1, columns)
-            velocities /= self._speeds(velocities[0], velocities[1], twists)
-            pulls = self._pulls[:, :, part].reshape(3, -1)
-            loads.append(pulls @ velocities.reshape(-1, columns))
-        total: Floats = sum(loads[1:], start=loads[0])
+        loads = (self._loads(part, twists) for part in self._parts(twists.shape[1]))
+        total = next(loads)
+        for each in loads:
+            total += each
         return total
+
+    def _loads(self, part: slice, twists: Floats) -> Floats:
+        """Return what some of the points add to the gradient."""
+        columns = twists.shape[1]
+        velocities = self._jacobians[:, part].reshape(-1, 3) @ twists
+        velocities = velocities.reshape(2, -1, columns)
+        velocities /= self._speeds(velocities[0], velocities[1], twists)
+        pulls = self._pulls[:, :, part].reshape(3, -1)
+        return np.asarray(pulls @ velocities.reshape(-1, columns))
 
     def values_and_normals(self, twists: Floats) -> tuple[Floats, Floats]:
         """Return D (m,) and its gradient (3, m), as `gradient` does."""

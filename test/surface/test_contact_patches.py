@@ -1,5 +1,7 @@
 """Shapes have their area and centre, pressures their centre, patches the loads known for them."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -151,3 +153,15 @@ def test_natural_scales_make_largest_force_and_moment_one():
 def test_what_is_no_patch_is_refused(build, error, message):
     with pytest.raises(error, match=message):
         build()
+
+
+def test_a_batch_for_many_cells_takes_the_memory_of_a_block():
+    surface = ContactPatch.of_shape(shapes.rectangle([0.1, 0.1], 10_000)).surface(0.3, 10.0)
+    twists = sampling.random_directions(2000, 1)
+    # What is worked out once does not count.
+    surface.wrench_of_twist(twists[:1000])
+    tracemalloc.start()
+    wrenches = surface.wrench_of_twist(twists)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 3e6 + 10 * wrenches.nbytes
