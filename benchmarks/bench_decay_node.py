@@ -31,7 +31,7 @@ from limit_surface_ros.surface.power_sum import PowerSum
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-SECONDS = 10.0
+SECONDS = 6.0
 PLAIN_TIMER = """
 import sys, rclpy
 from geometry_msgs.msg import WrenchStamped

@@ -15,7 +15,7 @@ from limit_surface_ros.surface.scaling import Scaling
 MANY = 100_000
 TRIANGLE = np.array([[-40, -40], [-40, 80], [80, -40]]) / 150
 SCALING = Scaling(0.1, 5.0)
-SURFACES, TWISTS, PROBES = 1000, 1000, 3000
+SURFACES, TWISTS, PROBES = 600, 1000, 3000
 
 
 def random_matrices(rng, terms, rank=3, spread=0.0):

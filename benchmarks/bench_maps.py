@@ -22,7 +22,7 @@ from limit_surface_ros.surface.scaling import Scaling
 SCALING = Scaling(0.1, 5.0)
 SIZES = (100, 1_000, 10_000, 100_000, 1_000_000)
 # Vectors after which a map that searches has made its table.
-TABLE = 10_000
+TABLE = 30_000
 # Size of the batch at which ours stands beside the ellipsoid.
 COMPARED = 10_000
 # Longest batch [s].

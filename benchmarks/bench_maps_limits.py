@@ -6,7 +6,7 @@ import time
 import tracemalloc
 
 import numpy as np
-from bench_maps import kinds
+from bench_maps import TABLE, kinds
 from c_maps import compiled, map_in_c
 from interleaved import interleaved
 
@@ -68,6 +68,7 @@ def cost_and_memory() -> None:
     for name, surface in kinds().items():
         for method in ("load_factor", "twist_of_wrench", "wrench_of_twist"):
             call = getattr(surface, method)
+            call(rows_of(TABLE))
             count = LARGE if timed(call, rows_of(1000)) / 1000 * LARGE < PATIENCE else LARGE // 10
             few, many = rows_of(count // 100), rows_of(count)
             times = interleaved({"few": lambda c=call, r=few: c(r)}, rounds=5)

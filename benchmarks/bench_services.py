@@ -46,7 +46,7 @@ from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_mod
 from limit_surface_ros.nodes import convert
 from limit_surface_ros.nodes.service_client import ServiceClient
 
-SINGLE_CALLS = 2000
+SINGLE_CALLS = 1500
 BATCH_CALLS = 100
 KIND_CALLS = 400
 KIND_BATCHES = 30

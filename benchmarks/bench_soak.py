@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 SECONDS = 30.0
 WARM_UP = 5.0
 # Of each row of the second table.
-ROW_SECONDS = 6.0
+ROW_SECONDS = 4.0
 CLIENTS = 4
 MODEL = "triangle_patch"
 # Time from one call of a client to the next [s]; 0: as soon as it was answered.
