@@ -153,7 +153,8 @@ class PeakInverse:
         self._gauge = gauge
         self._ellipsoids = self._inside(directions / gauge.values(directions))
         likeness = np.abs(directions.T @ directions)
-        self._neighbours = np.argsort(-likeness, axis=1)[:, 1 : _NEIGHBOURS + 1]
+        nearest = np.argsort(-likeness, axis=1)[:, 1 : _NEIGHBOURS + 1]
+        self._neighbours = np.ascontiguousarray(nearest.T)
 
     def solve(self, normals: Floats) -> tuple[Floats, Floats]:
         """Return the points (3, m) of most power for vectors (3, m), and that power (m,)."""
@@ -179,15 +180,17 @@ class PeakInverse:
     def starts_of_one(self, normal: Floats) -> Floats:
         """Return the starts (s, 3) that are worth climbing for one vector (3,)."""
         unit = normal / np.sqrt(normal @ normal)
-        rows, _ = self._peaks(unit[:, np.newaxis])
-        return np.asarray(self._ellipsoids[rows] @ unit)
+        reach = self._ellipsoids.reshape(-1, 9) @ np.multiply.outer(unit, unit).ravel()
+        high = reach >= _WORTH**2 * reach.max()
+        high &= reach >= np.maximum.reduce(reach.take(self._neighbours))
+        return np.asarray(self._ellipsoids[np.flatnonzero(high)] @ unit)
 
     def _peaks(self, units: Floats) -> tuple[Places, Places]:
         """Return the rows of the table that are worth climbing, and for which vectors (3, m)."""
         squares = (units[:, np.newaxis] * units).reshape(9, -1)
         reach = self._ellipsoids.reshape(-1, 9) @ squares
         high = reach >= _WORTH**2 * reach.max(axis=0)
-        for neighbour in self._neighbours.T:
+        for neighbour in self._neighbours:
             high &= reach >= reach[neighbour]
         rows, columns = np.nonzero(high)
         return rows, columns

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.surface.corners import FLAT, RIM
-from limit_surface_ros.surface.one_load import norm_of_one, one_load_terms
+from limit_surface_ros.surface.one_power_sum import OnePowerSum
 from limit_surface_ros.surface.one_twist import most_power_of_one
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ class OneMotion:
 
     def __init__(self, roots: Floats, inverse: ConvexInverse) -> None:
         """Keep R_k, shape (k, 3, 3), and the inverse for many loads of the same sum."""
-        self._terms = one_load_terms(roots, np.full(len(roots), 0.5), np.ones(3))
+        self._gauge = OnePowerSum(roots, np.full(len(roots), 0.5))
         self._inverse = inverse
         corners = inverse.corners
         self._corners = (
@@ -59,9 +59,12 @@ class OneMotion:
             motion, exact = found
             if exact:
                 return motion
-            if _product(motion, load) > _product(start, load) * norm_of_one(self._terms, motion):
+            dissipation = self._gauge.of_load(motion)
+            if dissipation is None:
+                return None
+            if _product(motion, load) > _product(start, load) * dissipation:
                 start = motion
-        return most_power_of_one(self._terms, load, [start])
+        return most_power_of_one(self._gauge, load, [start])
 
     def _at_corner(self, load: Vector) -> tuple[Vector, bool] | None:
         """Return the motion to expect by the nearest corner, and whether the load is in its cone.

@@ -1,42 +1,87 @@
-"""The load of most power of a power sum for a single twist, in plain floats.
+"""The load of most power for a single twist, in plain floats.
 
-Newton's method as in `plane_minimum`, with what is constant in the plane worked out beforehand.
-Whatever does not go smoothly is left to that module: the functions then return None.
+Newton's method as in `plane_minimum`. Whatever does not go smoothly is left to that module: the
+functions then return None.
 """
 
 from __future__ import annotations
 
-from math import exp, hypot, log, sqrt
-from typing import TYPE_CHECKING
+from math import hypot, sqrt
+from typing import TYPE_CHECKING, Protocol
 
-from limit_surface_ros.surface.one_load import gauge_of_one, log_scale_of_one, norm_of_one
+import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable
     from typing import TypeAlias
 
-    from limit_surface_ros.surface.one_load import Term, Vector
+    from limit_surface_ros.surface.gauge_inverse import Inverse
+    from limit_surface_ros.surface.one_load import Vector
+    from limit_surface_ros.surface.scaling import Scaling
 
-    # q0, b1, b2, a11, a12 and a22: in the plane a form is q0 + 2 b.x + x'a x.
-    Form: TypeAlias = tuple[float, float, float, float, float, float]
+    # Height, gradient and Newton's move at a place in a plane.
     Newton: TypeAlias = tuple[float, tuple[float, float], tuple[float, float]]
 
 _STEPS = 30
-# A form below this would make its term's curvature lose its digits: a corner is near.
-_SMALL = 1e-9
 _LAST_STEP = 1e-8
 _TARGET = 1e-14
 # A larger sine before a last step may come from a kink that drew Newton's method in.
 _PARALLEL = 1e-6
+# Twists between these are safe in plain floats.
+_SMALLEST, _LARGEST = 1e-100, 1e100
 
 
-def most_power_of_one(
-    terms: Sequence[Term], twist: Vector, starts: Iterable[Vector]
+class OneGauge(Protocol):
+    """A gauge g of scaled loads, for one load at a time."""
+
+    def of_load(self, load: Vector) -> float | None:
+        """Return g of a load; None if the load needs care."""
+        ...
+
+    def in_plane(
+        self, normal: Vector, first: Vector, second: Vector
+    ) -> Callable[[float, float], Newton | None]:
+        """Return a function of the p and q of a load n + p e1 + q e2.
+
+        It returns log g, its gradient, and Newton's move for g; None if the load needs care.
+
+        Args:
+            normal: n, a unit vector.
+            first: e1, a unit vector across n.
+            second: e2, a unit vector across both.
+        """
+        ...
+
+
+def wrench_of_one(
+    gauge: OneGauge, inverse: Inverse, scaling: Scaling, twist: Vector
 ) -> Vector | None:
+    """Map one twist to a wrench, both in physical units.
+
+    Args:
+        gauge: Of the surface g = 1.
+        inverse: Of the same surface, which knows where to start.
+        scaling: Of the surface.
+        twist: Not zero.
+    """
+    rho, force = scaling.characteristic_length, scaling.friction_force
+    x, y, z = twist[0], twist[1], twist[2] * rho
+    size = abs(x) + abs(y) + abs(z)
+    if not _SMALLEST < size < _LARGEST:
+        return None
+    scaled = (x / size, y / size, z / size)
+    starts = inverse.starts_of_one(np.array(scaled)).tolist()
+    load = most_power_of_one(gauge, scaled, starts)
+    if load is None:
+        return None
+    return force * load[0], force * load[1], force * rho * load[2]
+
+
+def most_power_of_one(gauge: OneGauge, twist: Vector, starts: Iterable[Vector]) -> Vector | None:
     """Return the load on the surface with the most power of those that the starts lead to.
 
     Args:
-        terms: Of scaled loads; see `one_load.one_load_terms`.
+        gauge: Of the surface g = 1.
         twist: Scaled, not zero.
         starts: Scaled loads with power above zero.
 
@@ -46,7 +91,7 @@ def most_power_of_one(
     best = None
     most = 0.0
     for start in starts:
-        load = _climb(terms, twist, start)
+        load = _climb(gauge, twist, start)
         if load is None:
             return None
         power = load[0] * twist[0] + load[1] * twist[1] + load[2] * twist[2]
@@ -55,7 +100,7 @@ def most_power_of_one(
     return best
 
 
-def _climb(terms: Sequence[Term], twist: Vector, start: Vector) -> Vector | None:
+def _climb(gauge: OneGauge, twist: Vector, start: Vector) -> Vector | None:
     """Minimise log g over the plane through n with normal n = twist / |twist|."""
     length = sqrt(twist[0] ** 2 + twist[1] ** 2 + twist[2] ** 2)
     nx, ny, nz = twist[0] / length, twist[1] / length, twist[2] / length
@@ -67,12 +112,11 @@ def _climb(terms: Sequence[Term], twist: Vector, start: Vector) -> Vector | None
     along = start[0] * nx + start[1] * ny + start[2] * nz
     p = (start[0] * first[0] + start[1] * first[1] + start[2] * first[2]) / along
     q = (start[0] * second[0] + start[1] * second[1] + start[2] * second[2]) / along
-    forms = [_in_plane(term, (nx, ny, nz), first, second) for term in terms]
-    norms = all(term[0] == 0.5 for term in terms)
+    newton = gauge.in_plane((nx, ny, nz), first, second)
     previous = float("inf")
     step_p = step_q = 0.0
     for _ in range(_STEPS):
-        found = _norms_newton(forms, p, q) if norms else _newton(terms, forms, p, q)
+        found = newton(p, q)
         if found is None:
             return None
         height, gradient, move = found
@@ -96,93 +140,12 @@ def _climb(terms: Sequence[Term], twist: Vector, start: Vector) -> Vector | None
                 ny + p * first[1] + q * second[1],
                 nz + p * first[2] + q * second[2],
             )
-            gauge = norm_of_one(terms, load) if norms else gauge_of_one(terms, load)
-            return None if gauge is None else (load[0] / gauge, load[1] / gauge, load[2] / gauge)
+            size = gauge.of_load(load)
+            return None if size is None else (load[0] / size, load[1] / size, load[2] / size)
     return None
 
 
-def _in_plane(term: Term, normal: Vector, first: Vector, second: Vector) -> Form:
-    """Return a term's form in the plane."""
-    _, _, a, b, c, d, e, f, g, h, i = term
-    x, y, z = normal
-    n0, n1, n2 = a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
-    x, y, z = first
-    p0, p1, p2 = a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
-    x, y, z = second
-    q0, q1, q2 = a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
-    return (
-        n0 * n0 + n1 * n1 + n2 * n2,
-        n0 * p0 + n1 * p1 + n2 * p2,
-        n0 * q0 + n1 * q1 + n2 * q2,
-        p0 * p0 + p1 * p1 + p2 * p2,
-        p0 * q0 + p1 * q1 + p2 * q2,
-        q0 * q0 + q1 * q1 + q2 * q2,
-    )
-
-
-def _value(form: Form, p: float, q: float) -> float:
-    q0, b1, b2, a11, a12, a22 = form
-    return q0 + p * (2.0 * b1 + a11 * p + 2.0 * a12 * q) + q * (2.0 * b2 + a22 * q)
-
-
-def _norms_newton(forms: list[Form], p: float, q: float) -> Newton | None:
-    """Return what `_newton` does where all exponents are 1/2, so that g is a sum of roots."""
-    gauge = g1 = g2 = h11 = h12 = h22 = 0.0
-    for q0, b1, b2, a11, a12, a22 in forms:
-        c1, c2 = b1 + a11 * p + a12 * q, b2 + a12 * p + a22 * q
-        value = q0 + p * (b1 + c1) + q * (b2 + c2)
-        if not value > _SMALL * (q0 + a11 * p * p + a22 * q * q):
-            return None
-        norm = sqrt(value)
-        gauge += norm
-        weight = 1.0 / norm
-        c1 *= weight
-        c2 *= weight
-        g1 += c1
-        g2 += c2
-        h11 += weight * (a11 - c1 * c1)
-        h12 += weight * (a12 - c1 * c2)
-        h22 += weight * (a22 - c2 * c2)
-    move = _newton_move(g1, g2, h11, h12, h22)
-    return None if move is None else (log(gauge), (g1 / gauge, g2 / gauge), move)
-
-
-def _newton(terms: Sequence[Term], forms: list[Form], p: float, q: float) -> Newton | None:
-    """Return log g, its gradient, and Newton's move for g; see `PowerGauge`."""
-    values = [_value(form, p, q) for form in forms]
-    for value, form in zip(values, forms, strict=True):
-        if not value > _SMALL * (form[0] + form[3] * p * p + form[5] * q * q):
-            return None
-    t = log_scale_of_one(terms, values)
-    if t is None:
-        return None
-    total = second_total = g1 = g2 = m1 = m2 = k11 = k12 = k22 = 0.0
-    for term, value, (_, b1, b2, a11, a12, a22) in zip(terms, values, forms, strict=True):
-        exponent = term[0]
-        share = 2.0 * exponent * exp(exponent * (log(value) + 2.0 * t))
-        weight = share / value
-        c1, c2 = b1 + a11 * p + a12 * q, b2 + a12 * p + a22 * q
-        bend = (2.0 * exponent - 2.0) / value
-        total += share
-        second_total += 2.0 * exponent * share
-        g1 += weight * c1
-        g2 += weight * c2
-        m1 += 2.0 * exponent * weight * c1
-        m2 += 2.0 * exponent * weight * c2
-        k11 += weight * (a11 + bend * c1 * c1)
-        k12 += weight * (a12 + bend * c1 * c2)
-        k22 += weight * (a22 + bend * c2 * c2)
-    g1 /= total
-    g2 /= total
-    both = second_total / total + 1.0
-    h11 = (k11 - 2.0 * m1 * g1) / total + both * g1 * g1
-    h12 = (k12 - m1 * g2 - m2 * g1) / total + both * g1 * g2
-    h22 = (k22 - 2.0 * m2 * g2) / total + both * g2 * g2
-    move = _newton_move(g1, g2, h11, h12, h22)
-    return None if move is None else (-t, (g1, g2), move)
-
-
-def _newton_move(
+def newton_move(
     g1: float, g2: float, h11: float, h12: float, h22: float
 ) -> tuple[float, float] | None:
     """Return the move to the minimum for a gradient and a Hessian, None if that is near flat."""

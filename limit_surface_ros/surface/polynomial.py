@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import sqrt
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -20,6 +21,8 @@ from limit_surface_ros.surface.gauge_inverse import (
     PeakInverse,
     round_frame,
 )
+from limit_surface_ros.surface.one_quartic import OneQuartic
+from limit_surface_ros.surface.one_twist import wrench_of_one
 from limit_surface_ros.surface.scaled_surface import ScaledSurface
 from limit_surface_ros.surface.scaling import Scaling
 from limit_surface_ros.surface.sphere import even_directions, of_unit_length
@@ -30,6 +33,7 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.surface.gauge_inverse import Inverse
+    from limit_surface_ros.surface.one_load import Vector
 
 # Exponents (i, j, k) of fx^i fy^j m^k in the order of the coefficients: x^4, x^3 y, x^3 m,
 # x^2 y^2, x^2 y m, x^2 m^2, x y^3, x y^2 m, x y m^2, x m^3, y^4, y^3 m, y^2 m^2, y m^3, m^4.
@@ -43,6 +47,8 @@ _CUBICS = [
     (0, 0, 3),
 ]
 _CHECKED_DIRECTIONS = 2000
+# Wrenches between these are safe in plain floats.
+_SMALLEST, _LARGEST = 1e-100, 1e100
 _STARTS = 500
 
 
@@ -127,6 +133,33 @@ class Polynomial(ScaledSurface):
 
     def _loads(self, twists: Floats) -> Floats:
         return self._inverse.solve(twists)[0]
+
+    @cached_property
+    def _one_gauge(self) -> OneQuartic:
+        return OneQuartic(self._first, self._second)
+
+    def _load_factor_of_one(self, wrench: Vector) -> float | None:
+        found = self._twist_and_load_factor_of_one(wrench)
+        return None if found is None else found[1]
+
+    def _twist_of_one(self, wrench: Vector) -> Vector | None:
+        found = self._twist_and_load_factor_of_one(wrench)
+        return None if found is None else found[0]
+
+    def _twist_and_load_factor_of_one(self, wrench: Vector) -> tuple[Vector, float] | None:
+        rho, force = self.scaling.characteristic_length, self.scaling.friction_force
+        x, y, m = wrench[0], wrench[1], wrench[2] / rho
+        size = abs(x) + abs(y) + abs(m)
+        if not _SMALLEST < size < _LARGEST:
+            return None
+        load = (x / size, y / size, m / size)
+        gx, gy, gm = self._one_gauge.gradient(load)
+        factor = sqrt(sqrt(0.25 * (gx * load[0] + gy * load[1] + gm * load[2])))
+        length = sqrt(gx * gx + gy * gy + gm * gm)
+        return (gx / length, gy / length, gm / (length * rho)), factor * (size / force)
+
+    def _wrench_of_one(self, twist: Vector) -> Vector | None:
+        return wrench_of_one(self._one_gauge, self._inverse, self.scaling, twist)
 
     @cached_property
     def _inverse(self) -> Inverse:

@@ -19,7 +19,8 @@ from limit_surface_ros.surface.one_load import (
     normal_and_gauge_of_one,
     one_load_terms,
 )
-from limit_surface_ros.surface.one_twist import most_power_of_one
+from limit_surface_ros.surface.one_power_sum import OnePowerSum
+from limit_surface_ros.surface.one_twist import wrench_of_one
 from limit_surface_ros.surface.power_sum_inverse import power_sum_inverse
 from limit_surface_ros.surface.power_sum_scale import PowerScale, power_scale
 from limit_surface_ros.surface.quadratic_form import BLIND, as_psd_matrices, root_of
@@ -36,8 +37,6 @@ if TYPE_CHECKING:
 
 # Part of a twist along a load without limit, above which its power is infinite.
 _FREE = 1e-12
-# Twists between these are safe in plain floats.
-_SMALLEST, _LARGEST = 1e-100, 1e100
 # Relative eigenvalue below which nothing limits a load.
 _NO_LIMIT = 1e-15
 
@@ -207,21 +206,13 @@ class PowerSum(ScaledSurface):
         return (x / length, y / length, z / length), factor
 
     @cached_property
-    def _scaled_terms(self) -> list[Term]:
-        return one_load_terms(self._roots, self.exponents, np.ones(3))
+    def _one_gauge(self) -> OnePowerSum:
+        return OnePowerSum(self._roots, self.exponents)
 
     def _wrench_of_one(self, twist: Vector) -> Vector | None:
-        rho, force = self.scaling.characteristic_length, self.scaling.friction_force
-        x, y, z = twist[0], twist[1], twist[2] * rho
-        size = abs(x) + abs(y) + abs(z)
-        if len(self._free) or not _SMALLEST < size < _LARGEST:
+        if len(self._free):
             return None
-        scaled = (x / size, y / size, z / size)
-        starts = self._inverse.starts_of_one(np.array(scaled)).tolist()
-        load = most_power_of_one(self._scaled_terms, scaled, starts)
-        if load is None:
-            return None
-        return force * load[0], force * load[1], force * rho * load[2]
+        return wrench_of_one(self._one_gauge, self._inverse, self.scaling, twist)
 
     def _load_factors(self, loads: Floats) -> Floats:
         forms = self._forms(self._images(loads), loads)
@@ -285,7 +276,8 @@ class PowerSum(ScaledSurface):
 
     def _images(self, columns: Floats) -> Floats:
         """Return R_i f, shape (k, 3, m), of columns (3, m)."""
-        return self._stacked_roots.dot(columns).reshape(-1, 3, columns.shape[1])
+        images: Floats = self._stacked_roots.dot(columns)
+        return images.reshape(-1, 3, columns.shape[1])
 
     @cached_property
     def _blind(self) -> Floats | None:

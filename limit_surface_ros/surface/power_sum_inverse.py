@@ -13,8 +13,8 @@ from limit_surface_ros.surface.gauge_inverse import (
     PeakInverse,
     round_frame,
 )
-from limit_surface_ros.surface.one_load import one_load_terms
-from limit_surface_ros.surface.one_twist import most_power_of_one
+from limit_surface_ros.surface.one_by_one import OneByOne
+from limit_surface_ros.surface.one_power_sum import OnePowerSum
 from limit_surface_ros.surface.power_gauge import PowerGauge
 from limit_surface_ros.surface.power_sum_scale import power_scale
 from limit_surface_ros.surface.quadratic_form import root_of
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 
 _CONVEX_STARTS = 200
 _STARTS = 500
-# Vectors up to which one after the other is the quicker way: with one peak, and with several.
-_FEW, _FEW_OF_MANY = 24, 8
 # Starts along the ridge that a term with a low exponent raises where its form is small.
 _RIDGE_STARTS = 48
 # A spike is the answer if nothing beats it by more than rounding.
@@ -53,42 +51,6 @@ class EllipsoidInverse:
         return np.asarray(self.solve(normal[:, np.newaxis])[0].T)
 
 
-class OneByOne:
-    """An inverse that takes few vectors one by one, in plain floats: numpy is slow with few."""
-
-    def __init__(
-        self, inverse: Inverse, roots: Floats, exponents: Floats, few: int = _FEW
-    ) -> None:
-        """Keep the inverse, which also solves what does not go smoothly alone.
-
-        Args:
-            inverse: Of the sum of powers.
-            roots: R_i, shape (k, 3, 3).
-            exponents: p_i, shape (k,).
-            few: How many are few.
-        """
-        self._inverse = inverse
-        self._few = few
-        self._terms = one_load_terms(roots, exponents, np.ones(3))
-
-    def solve(self, normals: Floats) -> tuple[Floats, Floats]:
-        """Return the points (3, m) of most power for vectors (3, m), and that power (m,)."""
-        if normals.shape[1] > self._few:
-            return self._inverse.solve(normals)
-        points: Floats = np.empty_like(normals)
-        for column, normal in enumerate(normals.T):
-            starts = self.starts_of_one(normal).tolist()
-            point = most_power_of_one(self._terms, normal.tolist(), starts)
-            if point is None:
-                point = self._inverse.solve(normal[:, np.newaxis])[0][:, 0]
-            points[:, column] = point
-        return points, (normals * points).sum(axis=0)
-
-    def starts_of_one(self, normal: Floats) -> Floats:
-        """Return points (s, 3) that lead smoothly to the answer for one vector (3,), if any do."""
-        return self._inverse.starts_of_one(normal)
-
-
 def power_sum_inverse(roots: Floats, exponents: Floats) -> Inverse:
     """Return the map from twists to loads of most power on sum_i |R_i f|^(2 p_i) = 1.
 
@@ -101,7 +63,7 @@ def power_sum_inverse(roots: Floats, exponents: Floats) -> Inverse:
     if (exponents == 0.5).all():
         norms = FormTerms(roots)
         climb = ConvexInverse(norms, even_directions(_CONVEX_STARTS).T, norms.corners())
-        return TabulatedInverse(norms, OneByOne(climb, roots, exponents))
+        return TabulatedInverse(norms, OneByOne(climb, OnePowerSum(roots, exponents)))
     frame = round_frame(PowerGauge(roots, exponents))
     return FramedInverse(frame, _inverse_of_round(roots @ frame, exponents))
 
@@ -111,9 +73,9 @@ def _inverse_of_round(roots: Floats, exponents: Floats) -> Inverse:
     gauge = PowerGauge(roots, exponents)
     if (exponents >= 0.5).all():
         climb = ConvexInverse(gauge, even_directions(_CONVEX_STARTS).T, gauge.corners())
-        return TabulatedInverse(gauge, OneByOne(climb, roots, exponents))
+        return TabulatedInverse(gauge, OneByOne(climb, OnePowerSum(roots, exponents)))
     peaks = PeakInverse(gauge, _starts(roots, exponents))
-    climb_all = OneByOne(peaks, roots, exponents, _FEW_OF_MANY)
+    climb_all = OneByOne(peaks, OnePowerSum(roots, exponents), several=True)
     summits = TabulatedInverse(gauge, climb_all, convex=False)
     ranks = np.abs(roots).any(axis=2).sum(axis=1)
     low = exponents <= 0.5

@@ -79,12 +79,12 @@ class PolynomialScale:
 
     def _roots(self, forms: Floats) -> Floats:
         """Return r_i = q_i^(1/n)."""
-        if self._degree == 1:
-            return forms.copy()
+        roots: Floats = forms.copy()
         if self._degree == 3:
-            return np.asarray(np.cbrt(forms))
-        roots = np.sqrt(forms)
-        return np.sqrt(roots, out=roots) if self._degree == 4 else np.asarray(roots)
+            return np.cbrt(roots, out=roots)
+        for _ in range(self._degree // 2):
+            np.sqrt(roots, out=roots)
+        return roots
 
     def _load_factors(self, root: Floats) -> Floats:
         """Return g = w^(n/2)."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import cache
 from math import hypot
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -320,7 +320,7 @@ def _product(a: _Pair, b: _Pair) -> float:
     return a[0] * b[0] + a[1] * b[1]
 
 
-def _pair(name: str, values: ArrayLike) -> _Pair:
+def _pair(name: str, values: Any) -> _Pair:
     if type(values) in (list, tuple) and len(values) == 2:
         x, y = values
         # The quick way for plain numbers; NaN and infinity fail the comparison.

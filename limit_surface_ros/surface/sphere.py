@@ -32,4 +32,4 @@ def of_unit_length(columns: Floats) -> Floats:
 def squared_lengths(columns: Floats) -> Floats:
     """Return the squared lengths (m,) of vectors (3, m)."""
     # The quickest way for few and for many.
-    return _ONES.dot(columns * columns)
+    return np.asarray(_ONES.dot(columns * columns))

@@ -138,14 +138,14 @@ class SupportTable:
         self._last_step: Floats = np.full(_CELLS**2, _SHORT_STEP)
         middles = _normals(_grid((np.arange(2 * _CELLS) + 0.5) / _CELLS - 1.0))
         found, certain = self.points(middles)
-        self._last_step = _of_cells(self._last_steps(middles)).min(axis=0)
+        self._last_step = np.asarray(_of_cells(self._last_steps(middles)).min(axis=0))
         if convex:
             self._useful = np.asarray(_of_cells(certain).any(axis=0))
         else:
             best = inverse.solve(middles)[0]
             certain &= np.abs(found - best).max(axis=0) <= _SAME * np.abs(best).max(axis=0)
             smooth = misfit <= _SMOOTH * np.abs(samples[0]).max()
-            self._useful = _of_cells(certain).all(axis=0) & smooth
+            self._useful = np.asarray(_of_cells(certain).all(axis=0) & smooth)
 
     def points(self, normals: Floats) -> tuple[Floats, Bools]:
         """Return points (3, m) for vectors (3, m), none zero, and which are certain (m,)."""
@@ -275,7 +275,7 @@ class SupportTable:
             _sum_of_products(sums[order_b, order_a:last], in_a[: last - order_a], place_of)
         found[0, 1:] *= _CELLS
         found[1] *= _CELLS**2
-        return found
+        return found[0], found[1]
 
 
 def _cells_of(place: Floats) -> tuple[Places, Floats]:
@@ -305,12 +305,12 @@ def _chart(normals: Floats) -> Floats:
     return np.asarray(normals[:2] / stretch)
 
 
-def _sum_of_products(first: Floats, second: Floats, out: Floats) -> None:
+def _sum_of_products(first: Any, second: Any, out: Any) -> None:
     """Write the sums (m,) of products of rows (k, m) with rows (k, m)."""
     np.einsum("km,km->m", first, second, out=out)
 
 
-def _of_cells(middles: Bools) -> Bools:
+def _of_cells(middles: Any) -> Any:
     """Return what holds in the middles of the quarters of each cell, shape (4, cells)."""
     quarters = middles.reshape(_CELLS, 2, _CELLS, 2)
     return np.asarray(np.moveaxis(quarters, 2, 1).reshape(-1, 4).T)
