@@ -13,7 +13,8 @@ from limit_surface_ros.surface.point_contacts import PointContacts
 from limit_surface_ros.surface.polynomial import Polynomial
 from limit_surface_ros.surface.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
-from limit_surface_ros.surface.tabulated_inverse import SupportTable, TabulatedInverse
+from limit_surface_ros.surface.support_table import SupportTable
+from limit_surface_ros.surface.tabulated_inverse import TabulatedInverse
 
 # More than it takes for a table.
 MANY = 30_000
