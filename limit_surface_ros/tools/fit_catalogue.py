@@ -26,6 +26,7 @@ from limit_surface_ros.fitting.catalogue import Outcome, outcomes
 from limit_surface_ros.fitting.worker_processes import available_cores, worker_processes
 from limit_surface_ros.surface.convexity import NotConvexWarning
 from limit_surface_ros.tools.executors import CLUSTER_IN_FLIGHT, check_address, dask_executor
+from limit_surface_ros.tools.fit_options import refuse_options_of_others
 from limit_surface_ros.tools.given_options import refuse_empty
 from limit_surface_ros.tools.program import FAILED, run_program
 from limit_surface_ros.tools.progress import progress_bar
@@ -35,7 +36,13 @@ from limit_surface_ros.tools.surface_fit import (
     check_fit_options,
     fit_model,
 )
-from limit_surface_ros.tools.training_data import ACCEPTED, SUFFIXES, is_bag, is_bag_folder
+from limit_surface_ros.tools.training_data import (
+    ACCEPTED,
+    SUFFIXES,
+    is_bag,
+    is_bag_folder,
+    kind_of_input,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -109,8 +116,8 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
-def objects(options: argparse.Namespace) -> list[CatalogueObject]:
-    """List the objects of the folder by name.
+def inputs(options: argparse.Namespace) -> list[Path]:
+    """List the contacts and recordings of the folder by name.
 
     Raises:
         FileError: The folder is absent, cannot be read or holds no object, is the output folder
@@ -134,7 +141,12 @@ def objects(options: argparse.Namespace) -> list[CatalogueObject]:
                 f"{options.folder}: {other.name} and {source.name} would both become "
                 f"{source.stem}.yaml; rename one of them"
             )
-    settings = fit_settings(options)
+    return sources
+
+
+def objects(sources: Iterable[Path], options: argparse.Namespace) -> list[CatalogueObject]:
+    """Return the objects of the inputs, in their order."""
+    output, settings = options.output.resolve(), fit_settings(options)
     return [
         CatalogueObject(source, output / f"{source.stem}.yaml", fingerprint(source, settings))
         for source in sources
@@ -237,7 +249,9 @@ def run(options: argparse.Namespace) -> int:
     check_fit_options(options)
     if options.dask is not None:
         check_address(options.dask)
-    every = objects(options)
+    sources = inputs(options)
+    refuse_options_of_others(parser(), options, {kind_of_input(source) for source in sources})
+    every = objects(sources, options)
     try:
         options.output.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -22,11 +22,11 @@ from limit_surface_ros.fitting.second_approximation import fit_second_approximat
 from limit_surface_ros.surface.power_sum import thesis_exponents
 from limit_surface_ros.tools.given_options import check_ranges
 from limit_surface_ros.tools.training_data import (
-    CONTACT_SUFFIXES,
+    BAG,
+    CONTACT,
     Simulation,
     check_input,
     check_scaling,
-    is_bag,
     training_data_of_bag,
     training_data_of_contact,
     training_data_of_pushes,
@@ -61,8 +61,6 @@ RANGES = {
 }
 # Frame of a model whose data state none.
 DEFAULT_FRAME = "object"
-# Objectives that look at loads alone.
-WITHOUT_MOTIONS = ("J1", "forces", "least-squares")
 # What each kind can be fitted by, the default first.
 OBJECTIVES: dict[str, tuple[str, ...]] = {
     "power_sum": ("J2", "J1", "second"),
@@ -269,13 +267,13 @@ def read_input(path: Path, options: argparse.Namespace) -> TrainingData:
         FileError: The input is absent or not valid.
         DataError: It has not the rows or topics that the options ask for.
     """
-    suffix = check_input(path)
-    if is_bag(path):
+    kind = check_input(path)
+    if kind == BAG:
         rules = {rule: getattr(options, rule) for rule in asdict(Selection())}
         return training_data_of_bag(
             path, options.wrench_topic, options.motion_topic, Selection(**rules)
         )
-    if suffix in CONTACT_SUFFIXES:
+    if kind == CONTACT:
         simulation = Simulation(
             options.motions,
             options.facet_loads,
@@ -312,8 +310,6 @@ def fit_as_told(
     options: argparse.Namespace, data: TrainingData, scaling: Scaling, search: Search
 ) -> FitResult:
     """Fit the kind and the objective that the options name."""
-    if options.bootstrap:
-        raise RangeError("--bootstrap refits what --auto has chosen: give both")
     objective, weight = objective_of(options, data.recorded), float(options.velocity_weight)
     pairs = data.training
     if options.kind == "polynomial":

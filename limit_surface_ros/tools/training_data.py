@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.surface.pairs import Pairs
 
+# What an input can be, as messages call it.
+CONTACT, PUSHES, BAG = "a contact file", "a CSV of pushes", "a bag"
 CONTACT_SUFFIXES = (".yaml", ".yml")
 SUFFIXES = (*CONTACT_SUFFIXES, ".csv")
 BAG_SUFFIXES = (".mcap", ".db3")
@@ -205,7 +207,7 @@ def check_scaling(scaling: Scaling) -> None:
 
 
 def check_input(path: Path) -> str:
-    """Return the suffix of an input of a kind that is read, in small letters.
+    """Return what an input is, by its name: CONTACT, PUSHES or BAG.
 
     Raises:
         FileError: There is no such file, or it is of no such kind.
@@ -225,7 +227,14 @@ def check_input(path: Path) -> str:
     elif suffix not in (*SUFFIXES, *BAG_SUFFIXES):
         found = f"files that end in {suffix} are" if suffix else "a file without a suffix is"
         raise FileError(f"{path}: {found} not known; accepted is {ACCEPTED}")
-    return suffix
+    return kind_of_input(path)
+
+
+def kind_of_input(path: Path) -> str:
+    """Return what an input that is there is, by its name: CONTACT, PUSHES or BAG."""
+    if is_bag(path):
+        return BAG
+    return CONTACT if path.suffix.lower() in CONTACT_SUFFIXES else PUSHES
 
 
 def is_bag_folder(path: Path) -> bool:

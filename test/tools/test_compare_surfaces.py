@@ -121,6 +121,8 @@ def test_the_distributions_are_drawn(contact, tmp_path, capsys):
         (["--fit", "auto:3"], "--fit auto takes no number of terms; got 'auto:3'"),
         (["--fit", "polynomial:3"], "--fit polynomial takes no number of terms"),
         (["--fit", "second:5"], "--fit second takes no number of terms"),
+        (["--fit", "norms:2", "--auto"], "--auto does nothing here: it is written --fit auto"),
+        (["--fit", "norms:2", "--folds", "3"], "--folds does nothing here: it is for --fit auto"),
         (["--fit", "norms:2", "--seed", "-1"], "--seed must be from 0"),
         (["--fit", "norms:2", "--picture", "x.foo"], "x.foo: cannot be written: must end in .png"),
         (["--fit", "norms:2", "--picture", "no/x.png"], "its folder does not exist"),
