@@ -1,7 +1,8 @@
 """Fit a limit surface to each contact or recording in a folder, and write one model for each.
 
 A run that is interrupted, or killed, goes on where it was when the same command is given again:
-models that are finished are kept, as long as their input and the options are what they were.
+models that are finished are kept, as long as their input, the options and the version of this
+package are what they were.
 An object that cannot be fitted fails alone; the exit code is then 1.
 """
 
@@ -20,6 +21,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from limit_surface_ros import __version__
 from limit_surface_ros.errors import FileError, LimitSurfaceError
 from limit_surface_ros.files.surface_file import read_surface_model, write_surface_model
 from limit_surface_ros.fitting.catalogue import Outcome, outcomes
@@ -70,7 +72,7 @@ class CatalogueObject:
     Attributes:
         source: Its contact or recording, an absolute path.
         target: Its model file.
-        made_from: Stands for the content of the source and the options of the fit.
+        made_from: Stands for the content of the source, the options of the fit and the version.
     """
 
     source: Path
@@ -154,9 +156,9 @@ def objects(sources: Iterable[Path], options: argparse.Namespace) -> list[Catalo
 
 
 def fit_settings(options: argparse.Namespace) -> str:
-    """Return the options on which models depend, as text."""
+    """Return the options on which models depend, and the version that fits them, as text."""
     values = {key: val for key, val in vars(options).items() if key not in _WORKING_OPTIONS}
-    return json.dumps(values, sort_keys=True, default=str)
+    return json.dumps({"version": __version__, **values}, sort_keys=True, default=str)
 
 
 def is_input(path: Path) -> bool:
@@ -167,7 +169,7 @@ def is_input(path: Path) -> bool:
 
 
 def fingerprint(source: Path, settings: str) -> str:
-    """Return what stands for an input's content and the options; empty if it is unreadable."""
+    """Return what stands for an input's content and the settings; empty if it is unreadable."""
     digest = hashlib.sha256(settings.encode())
     files = sorted(source.rglob("*")) if source.is_dir() else [source]
     try:

@@ -160,6 +160,16 @@ def test_finished_models_are_kept_until_their_input_or_the_options_change(
     assert "4 finished before" not in capsys.readouterr().out.splitlines()[-2]
 
 
+def test_models_of_another_version_are_fitted_anew(folder, tmp_path, capsys, monkeypatch):
+    output = tmp_path / "models"
+    run(folder, output)
+    monkeypatch.setattr(fit_catalogue, "__version__", "999.0.0")
+    for told in ("0 finished before, 4 to fit", "4 finished before, 0 to fit"):
+        capsys.readouterr()
+        assert run(folder, output) == 0
+        assert told in capsys.readouterr().out
+
+
 def test_an_interrupted_run_leaves_whole_models_and_goes_on(tmp_path, capsys):
     names = write_objects(tmp_path / "pushes", 30)
     output = tmp_path / "models"
