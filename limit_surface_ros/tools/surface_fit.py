@@ -27,6 +27,7 @@ from limit_surface_ros.tools.training_data import (
     Simulation,
     check_input,
     check_scaling,
+    naming,
     training_data_of_bag,
     training_data_of_contact,
     training_data_of_pushes,
@@ -243,12 +244,9 @@ def fit_model(
         FileError: The input is absent or not valid.
         LimitSurfaceError: The data cannot support the fit, or an option is out of range.
     """
-    try:
-        data = read_input(path, options)
+    data = read_input(path, options)
+    with naming(path):
         result = fit(options, data, Search(options.starts, options.seed, executor, progress))
-    except DataError as error:
-        named = str(error).startswith(f"{path}: ")
-        raise error if named else DataError(f"{path}: {error}") from None
     model = SurfaceModel(
         name=name or data.name or default_name,
         surface=result.surface,
@@ -265,7 +263,8 @@ def read_input(path: Path, options: argparse.Namespace) -> TrainingData:
 
     Raises:
         FileError: The input is absent or not valid.
-        DataError: It has not the rows or topics that the options ask for.
+        DataError: It is of no size that a model file takes, or has not the rows or topics that
+            the options ask for; the message names the input.
     """
     kind = check_input(path)
     if kind == BAG:

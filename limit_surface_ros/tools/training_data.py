@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,7 @@ from limit_surface_ros.surface.sampling import random_motions
 from limit_surface_ros.surface.scaling import Scaling
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from limit_surface_ros.surface.pairs import Pairs
 
@@ -56,6 +57,19 @@ class TrainingData:
     reference_point: tuple[float, float] = (0.0, 0.0)
     recorded: bool = False
     about: Mapping[str, Any] = field(default_factory=dict)
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Name the file of the data in errors of the block, which knows nothing of files.
+
+    Raises:
+        DataError: The block raised one; this one names the file, too.
+    """
+    try:
+        yield
+    except DataError as error:
+        raise DataError(f"{path}: {error}") from None
 
 
 def row_numbers(text: str, count: int) -> list[int]:
@@ -98,7 +112,8 @@ def training_data_of_pushes(path: Path, selected: str | None) -> TrainingData:
         DataError: There are no such rows.
     """
     pushes = read_pushes(path)
-    rows = None if selected is None else row_numbers(selected, len(pushes.pairs))
+    with naming(path):
+        rows = None if selected is None else row_numbers(selected, len(pushes.pairs))
     training = pushes.pairs if rows is None else pushes.rows(rows)
     others = len(pushes.pairs) - len(training)
     support = pushes.support()
@@ -165,7 +180,8 @@ def training_data_of_contact(
     if characteristic_length is not None:
         scaling = Scaling(characteristic_length, exact.scaling.friction_force)
         exact = PointContacts(exact.points, exact.friction_limits, scaling)
-    check_scaling(exact.scaling)
+    with naming(path):
+        check_scaling(exact.scaling)
     training = simulated_pairs(
         exact,
         simulation.motions,

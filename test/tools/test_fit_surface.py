@@ -228,6 +228,21 @@ def test_what_is_wrong_with_the_data_is_told_with_their_file(pushes, tmp_path, c
     assert "pushes.csv: 3 pushes are too few, even for a fit" in capsys.readouterr().err
 
 
+def test_an_error_names_the_file_of_the_data_once(pushes, tmp_path, capsys):
+    contact, bag = tmp_path / "contact.yaml", tmp_path / "pushes.mcap"
+    contact.write_text(CONTACT.replace("0.08", "1.0e+99"))
+    bag.touch()
+    for data, options in (
+        (pushes, ["--rows", "70"]),
+        (pushes, ["--rows", "0-2"]),
+        (pushes, ["--auto", "--support"]),
+        (contact, []),
+        (bag, []),
+    ):
+        assert main([str(data), "-o", str(tmp_path / "m.yaml"), *options]) == 2
+        assert capsys.readouterr().err.count(str(data)) == 1
+
+
 def test_data_of_a_size_that_no_model_file_takes_are_refused(tmp_path, capsys):
     contact = tmp_path / "contact.yaml"
     contact.write_text(CONTACT.replace("0.08", "1.0e+99"))
