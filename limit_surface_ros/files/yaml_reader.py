@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.checks import Floats
 
+# How the names of YAML files may end, in small letters.
+YAML_SUFFIXES = (".yaml", ".yml")
 # No model is larger: a matrix takes some 200 bytes.
 MAX_BYTES = 16 * 2**20
 MAX_DEPTH = 100

@@ -12,11 +12,12 @@ import numpy as np
 
 from limit_surface_ros.checks import counted
 from limit_surface_ros.files.surface_file import write_surface_model
+from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
 from limit_surface_ros.fitting.multi_start import AGREEMENT, process_pool
 from limit_surface_ros.fitting.worker_processes import available_cores
 from limit_surface_ros.tools.fit_options import refuse_options_of_others
 from limit_surface_ros.tools.given_options import named_path, refuse_empty
-from limit_surface_ros.tools.output_file import MODEL_SUFFIXES, check_output
+from limit_surface_ros.tools.output_file import check_output
 from limit_surface_ros.tools.program import run_program
 from limit_surface_ros.tools.progress import progress_bar
 from limit_surface_ros.tools.surface_fit import (
@@ -116,7 +117,7 @@ def print_errors(label: str, errors: Errors) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Read, fit, write, report."""
-    check_output(options.output, MODEL_SUFFIXES, [options.input])
+    check_output(options.output, YAML_SUFFIXES, [options.input])
     refuse_empty(options, ["name", "frame_id"])
     check_fit_options(options)
     refuse_options_of_others(parser(), options, [check_input(options.input)])

@@ -12,6 +12,7 @@ from limit_surface_ros.files.bag_pushes import Selection, read_bag_pushes
 from limit_surface_ros.files.contact_file import read_contact
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.files.surface_file import LARGEST_SCALE
+from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
 from limit_surface_ros.fitting.simulation import simulated_pairs
 from limit_surface_ros.surface.point_contacts import PointContacts
 from limit_surface_ros.surface.sampling import random_motions
@@ -24,8 +25,7 @@ if TYPE_CHECKING:
 
 # What an input can be, as messages call it.
 CONTACT, PUSHES, BAG = "a contact file", "a CSV of pushes", "a bag"
-CONTACT_SUFFIXES = (".yaml", ".yml")
-SUFFIXES = (*CONTACT_SUFFIXES, ".csv")
+SUFFIXES = (*YAML_SUFFIXES, ".csv")
 BAG_SUFFIXES = (".mcap", ".db3")
 ACCEPTED = "a contact file (.yaml, .yml), recorded pushes (.csv), or a ROS 2 bag"
 
@@ -250,7 +250,7 @@ def kind_of_input(path: Path) -> str:
     """Return what an input that is there is, by its name: CONTACT, PUSHES or BAG."""
     if is_bag(path):
         return BAG
-    return CONTACT if path.suffix.lower() in CONTACT_SUFFIXES else PUSHES
+    return CONTACT if path.suffix.lower() in YAML_SUFFIXES else PUSHES
 
 
 def is_bag_folder(path: Path) -> bool:
