@@ -63,6 +63,10 @@ setup(
     extras_require=EXTRAS,
     zip_safe=False,
     entry_points={
-        "console_scripts": [f"{name} = {module}:main" for name, module in PROGRAMS.items()],
+        # Not the modules themselves: Ctrl-C would end their imports with a traceback.
+        "console_scripts": [
+            f"{name} = {PACKAGE}.start:{module.removeprefix(f'{PACKAGE}.')}"
+            for name, module in PROGRAMS.items()
+        ],
     },
 )

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 from limit_surface_ros.errors import FileError, UnknownModelError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
 
 # Names in a message; thousands would drown the rest of it.
@@ -36,23 +36,21 @@ class ModelSet(Generic[Model]):
     """Models by name, one of them the default.
 
     Args:
-        models: The models, at least one, no two of one name.
+        models: The models by their names, at least one.
         default: Name of the model that an empty name stands for; empty: the first.
         noun: What a request calls such a model, for messages.
 
     Raises:
-        FileError: There is no model, or two have one name.
+        FileError: There is no model.
         UnknownModelError: The default is not among them.
     """
 
-    def __init__(self, models: Iterable[Model], default: str = "", noun: str = "model") -> None:
-        """Index the models by name."""
+    def __init__(
+        self, models: Mapping[str, Model], default: str = "", noun: str = "model"
+    ) -> None:
+        """Check that there is a default."""
         self._noun = noun
-        self._models: dict[str, Model] = {}
-        for model in models:
-            if model.name in self._models:
-                raise FileError(f"two models are named {model.name!r}: names must differ")
-            self._models[model.name] = model
+        self._models = dict(models)
         if not self._models:
             raise FileError("no model file is given; at least one is needed")
         self.default = default or next(iter(self._models))
@@ -139,15 +137,14 @@ def read_model_set(
         FileError: A file is absent or not valid, or two models share a name.
         UnknownModelError: The default is not among the models.
     """
-    models: list[Model] = []
+    models: dict[str, Model] = {}
     places: dict[str, Path] = {}
     for path in model_paths(entries):
         model = read(path)
-        if model.name in places:
+        if model.name in models:
             raise FileError(
                 f"{path}: holds a model named {model.name!r}, as {places[model.name]} does: "
                 "names must differ"
             )
-        places[model.name] = path
-        models.append(model)
+        models[model.name], places[model.name] = model, path
     return ModelSet(models, default, noun)

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.checks import Floats
 
+# How the names of YAML files may end, in small letters.
+YAML_SUFFIXES = (".yaml", ".yml")
 # No model is larger: a matrix takes some 200 bytes.
 MAX_BYTES = 16 * 2**20
 MAX_DEPTH = 100
@@ -340,6 +342,12 @@ def read_yaml(path: str | Path) -> Section:
         raise FileError(f"{path}: {_told(error)}") from None
     except (yaml.YAMLError, ValueError) as error:
         raise FileError(f"{path}: is not YAML: {error}") from None
+    except (LookupError, AttributeError, TypeError):
+        # PyYAML builds what a tag names without a look at what stands there.
+        raise FileError(
+            f"{path}: a tag such as !!bool stands before what is none; accepted are values "
+            "without tags"
+        ) from None
     if not isinstance(values, dict):
         kind = "is empty" if values is None else f"holds {type(values).__name__} at its top level"
         raise FileError(f"{path}: {kind}; a mapping of keys to values is accepted")

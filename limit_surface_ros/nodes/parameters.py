@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import traceback
 from typing import TYPE_CHECKING, Any, Protocol
 
 from rcl_interfaces.msg import (
@@ -15,6 +16,7 @@ from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.parameter import Parameter
 
 from limit_surface_ros.errors import LimitSurfaceError, RangeError
+from limit_surface_ros.nodes import answers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable
@@ -56,6 +58,7 @@ class Parameters:
 
     def __init__(self, node: Node, table: Iterable[Setting]) -> None:
         """Declare the table."""
+        self._logger = node.get_logger()
         self._settings = {setting.name: setting for setting in table}
         self._concerned: list[tuple[frozenset[str], Prepare]] = []
         self._applied_next: list[Callable[[], None]] = []
@@ -109,8 +112,11 @@ class Parameters:
                 for names, prepare in self._concerned
                 if not names.isdisjoint(changed)
             ]
-        except LimitSurfaceError as error:
-            return SetParametersResult(successful=False, reason=str(error))
+        except Exception as error:
+            if not isinstance(error, LimitSurfaceError):
+                # A defect; whoever sets the parameter waits for an answer even so.
+                self._logger.error("".join(traceback.format_exception(error)))
+            return SetParametersResult(successful=False, reason=answers.sentence(error))
         self._applied_next = [lambda: self._values.update(changed), *apply]
         return SetParametersResult(successful=True)
 

@@ -24,7 +24,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
-from limit_surface_ros.errors import FileError, LimitSurfaceError
+from limit_surface_ros.errors import FileError, LimitSurfaceError, RangeError
 from limit_surface_ros.nodes.settings import Setting, help_of
 
 if TYPE_CHECKING:
@@ -53,7 +53,8 @@ TIME_TO_SEND = 0.3
 EXECUTOR = Setting(
     "executor",
     "single_threaded",
-    "Executor of the process; `events` needs less of the processor and is experimental in rclpy",
+    "Executor of the process, the same for all its nodes; `events` needs less of the processor "
+    "and is experimental in rclpy",
     choices=("single_threaded", "events"),
     read_only=True,
 )
@@ -75,7 +76,8 @@ def run(
         argv: The command line, the program's name first.
 
     Returns:
-        The process's exit code: 0 after SIGINT or SIGTERM, 1 if the nodes could not start.
+        The process's exit code: 0 after SIGINT or SIGTERM, 1 if the nodes could not start, be it
+        because they ask for different executors.
     """
     # Whichever thread the kernel picks (OpenBLAS has some of its own), Python writes to this end.
     woken, wakes = socket.socketpair()
@@ -100,6 +102,7 @@ def run(
             raise FileError(f"ROS 2 finds no place for its log: set one of {', '.join(_HOMES)}")
         rclpy.init(args=list(argv), signal_handler_options=SignalHandlerOptions.NO)
         nodes = make_nodes()
+        executor = _executor(nodes)
     except _CONFIGURATION_ERRORS as error:
         sentence = f"cannot start: {error}"
         if isinstance(error, FileError) and len(tables) > 1:
@@ -107,7 +110,6 @@ def run(
         rclpy.logging.get_logger("limit_surface_ros").fatal(sentence)
         rclpy.try_shutdown()
         return 1
-    executor = _executor(nodes[0])
     for node in nodes:
         executor.add_node(node)
     _spin_until_woken(executor, woken, wakes)
@@ -119,12 +121,28 @@ def run(
     return 0
 
 
-def _executor(node: Node) -> Executor:
-    if node.get_parameter(EXECUTOR.name).value == "events":
+def _executor(nodes: Sequence[Node]) -> Executor:
+    """Make the executor that the nodes ask for.
+
+    Raises:
+        RangeError: They ask for different ones.
+    """
+    asked = [str(node.get_parameter(EXECUTOR.name).value) for node in nodes]
+    if len(set(asked)) > 1:
+        told = ", ".join(
+            f"{value} for {node.get_name()}" for node, value in zip(nodes, asked, strict=True)
+        )
+        raise RangeError(
+            f"{EXECUTOR.name} is {told}; the nodes of a process share one: give all of them the "
+            f"same, such as by -p {EXECUTOR.name}:=events"
+        )
+    if asked[0] == "events":
         try:
             from rclpy.experimental import EventsExecutor
         except ImportError:
-            node.get_logger().warning("this rclpy has no EventsExecutor; single_threaded is used")
+            nodes[0].get_logger().warning(
+                "this rclpy has no EventsExecutor; single_threaded is used"
+            )
         else:
             return EventsExecutor()
     return SingleThreadedExecutor()

@@ -34,7 +34,8 @@ from limit_surface_ros.surface.measures import load_error, quantiles, velocity_e
 from limit_surface_ros.surface.point_contacts import PointContacts
 from limit_surface_ros.surface.polynomial import Polynomial
 from limit_surface_ros.surface.power_sum import PowerSum
-from limit_surface_ros.tools.given_options import named_path
+from limit_surface_ros.tools.fit_options import OF_AUTO
+from limit_surface_ros.tools.given_options import named_path, refuse_unused
 from limit_surface_ros.tools.output_file import check_output
 from limit_surface_ros.tools.program import run_program
 from limit_surface_ros.tools.progress import progress_bar
@@ -213,6 +214,9 @@ def run(options: argparse.Namespace) -> None:
     if not options.models and not options.fit:
         raise RangeError("nothing to compare: give --models or --fit")
     check_fit_options(options)
+    refuse_unused(parser(), options, ["auto"], "written --fit auto")
+    if "auto" not in options.fit:
+        refuse_unused(parser(), options, OF_AUTO, "for --fit auto")
     wanted = {word: options_of(options, word) for word in options.fit}
     if options.picture is not None:
         # Before the fits, and not after them, if the picture cannot be made.

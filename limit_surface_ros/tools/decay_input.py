@@ -15,7 +15,8 @@ from limit_surface_ros.decay.targets import Record
 from limit_surface_ros.errors import DataError, FileError, RangeError
 from limit_surface_ros.files.bag_reader import read_topic
 from limit_surface_ros.files.response_csv import read_response
-from limit_surface_ros.tools.output_file import MODEL_SUFFIXES
+from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
+from limit_surface_ros.tools.training_data import is_bag
 
 if TYPE_CHECKING:
     import argparse
@@ -132,12 +133,12 @@ def read_input(options: argparse.Namespace) -> DecayInput:
         )
     if options.topic is not None:
         record = record_of_bag(path, options.topic, options.field)
-    elif path.suffix.lower() in MODEL_SUFFIXES:
+    elif path.suffix.lower() in YAML_SUFFIXES:
         raise FileError(
             f"{path}: is YAML and no record; accepted are an example, a CSV file of times and "
             "values, and a bag (fit_surface fits contacts, plot_decay draws decay models)"
         )
-    elif path.is_dir() or path.suffix in (".mcap", ".db3"):
+    elif is_bag(path):
         raise FileError(f"{path}: is a bag: say which topic to read, with --topic")
     else:
         record = read_response(path, options.time_column, options.value_column)

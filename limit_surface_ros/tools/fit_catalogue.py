@@ -1,7 +1,8 @@
 """Fit a limit surface to each contact or recording in a folder, and write one model for each.
 
 A run that is interrupted, or killed, goes on where it was when the same command is given again:
-models that are finished are kept, as long as their input and the options are what they were.
+models that are finished are kept, as long as their input, the options and the version of this
+package are what they were.
 An object that cannot be fitted fails alone; the exit code is then 1.
 """
 
@@ -20,12 +21,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from limit_surface_ros import __version__
 from limit_surface_ros.errors import FileError, LimitSurfaceError
 from limit_surface_ros.files.surface_file import read_surface_model, write_surface_model
 from limit_surface_ros.fitting.catalogue import Outcome, outcomes
 from limit_surface_ros.fitting.worker_processes import available_cores, worker_processes
 from limit_surface_ros.surface.convexity import NotConvexWarning
 from limit_surface_ros.tools.executors import CLUSTER_IN_FLIGHT, check_address, dask_executor
+from limit_surface_ros.tools.fit_options import refuse_options_of_others
 from limit_surface_ros.tools.given_options import refuse_empty
 from limit_surface_ros.tools.program import FAILED, run_program
 from limit_surface_ros.tools.progress import progress_bar
@@ -35,7 +38,13 @@ from limit_surface_ros.tools.surface_fit import (
     check_fit_options,
     fit_model,
 )
-from limit_surface_ros.tools.training_data import ACCEPTED, SUFFIXES, is_bag, is_bag_folder
+from limit_surface_ros.tools.training_data import (
+    ACCEPTED,
+    SUFFIXES,
+    is_bag,
+    is_bag_folder,
+    kind_of_input,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -63,7 +72,7 @@ class CatalogueObject:
     Attributes:
         source: Its contact or recording, an absolute path.
         target: Its model file.
-        made_from: Stands for the content of the source and the options of the fit.
+        made_from: Stands for the content of the source, the options of the fit and the version.
     """
 
     source: Path
@@ -109,8 +118,8 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
-def objects(options: argparse.Namespace) -> list[CatalogueObject]:
-    """List the objects of the folder by name.
+def inputs(options: argparse.Namespace) -> list[Path]:
+    """List the contacts and recordings of the folder by name.
 
     Raises:
         FileError: The folder is absent, cannot be read or holds no object, is the output folder
@@ -134,7 +143,12 @@ def objects(options: argparse.Namespace) -> list[CatalogueObject]:
                 f"{options.folder}: {other.name} and {source.name} would both become "
                 f"{source.stem}.yaml; rename one of them"
             )
-    settings = fit_settings(options)
+    return sources
+
+
+def objects(sources: Iterable[Path], options: argparse.Namespace) -> list[CatalogueObject]:
+    """Return the objects of the inputs, in their order."""
+    output, settings = options.output.resolve(), fit_settings(options)
     return [
         CatalogueObject(source, output / f"{source.stem}.yaml", fingerprint(source, settings))
         for source in sources
@@ -142,9 +156,9 @@ def objects(options: argparse.Namespace) -> list[CatalogueObject]:
 
 
 def fit_settings(options: argparse.Namespace) -> str:
-    """Return the options on which models depend, as text."""
+    """Return the options on which models depend, and the version that fits them, as text."""
     values = {key: val for key, val in vars(options).items() if key not in _WORKING_OPTIONS}
-    return json.dumps(values, sort_keys=True, default=str)
+    return json.dumps({"version": __version__, **values}, sort_keys=True, default=str)
 
 
 def is_input(path: Path) -> bool:
@@ -155,7 +169,7 @@ def is_input(path: Path) -> bool:
 
 
 def fingerprint(source: Path, settings: str) -> str:
-    """Return what stands for an input's content and the options; empty if it is unreadable."""
+    """Return what stands for an input's content and the settings; empty if it is unreadable."""
     digest = hashlib.sha256(settings.encode())
     files = sorted(source.rglob("*")) if source.is_dir() else [source]
     try:
@@ -237,7 +251,9 @@ def run(options: argparse.Namespace) -> int:
     check_fit_options(options)
     if options.dask is not None:
         check_address(options.dask)
-    every = objects(options)
+    sources = inputs(options)
+    refuse_options_of_others(parser(), options, {kind_of_input(source) for source in sources})
+    every = objects(sources, options)
     try:
         options.output.mkdir(parents=True, exist_ok=True)
     except OSError as error:

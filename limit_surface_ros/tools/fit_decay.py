@@ -24,9 +24,10 @@ from limit_surface_ros.decay.response_fits import largest_error
 from limit_surface_ros.decay.smoothing import resting_level
 from limit_surface_ros.decay.targets import Record
 from limit_surface_ros.files.decay_file import DecayModel, write_decay_model
+from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
 from limit_surface_ros.tools.decay_input import add_input_options, read_input
 from limit_surface_ros.tools.given_options import refuse_empty, refuse_unused
-from limit_surface_ros.tools.output_file import MODEL_SUFFIXES, check_output
+from limit_surface_ros.tools.output_file import check_output
 from limit_surface_ros.tools.program import run_program
 from limit_surface_ros.tools.training_data import is_bag
 
@@ -261,7 +262,7 @@ def refuse_options_of_others(options: argparse.Namespace) -> None:
 def run(options: argparse.Namespace) -> None:
     """Read, fit, write, report."""
     if options.output is not None:
-        check_output(options.output, MODEL_SUFFIXES, [Path(options.input)])
+        check_output(options.output, YAML_SUFFIXES, [Path(options.input)])
     refuse_empty(options, ["name"])
     refuse_options_of_others(options)
     chosen = method_options(options)

@@ -5,30 +5,28 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from limit_surface_ros.checks import counted
-from limit_surface_ros.files.bag_pushes import Selection
 from limit_surface_ros.files.surface_file import write_surface_model
+from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
 from limit_surface_ros.fitting.multi_start import AGREEMENT, process_pool
 from limit_surface_ros.fitting.worker_processes import available_cores
-from limit_surface_ros.tools.given_options import named_path, refuse_empty, refuse_unused
-from limit_surface_ros.tools.output_file import MODEL_SUFFIXES, check_output
+from limit_surface_ros.tools.fit_options import refuse_options_of_others
+from limit_surface_ros.tools.given_options import named_path, refuse_empty
+from limit_surface_ros.tools.output_file import check_output
 from limit_surface_ros.tools.program import run_program
 from limit_surface_ros.tools.progress import progress_bar
 from limit_surface_ros.tools.surface_fit import (
-    WITHOUT_MOTIONS,
     add_fit_options,
     add_frame_option,
     check_fit_options,
     fit_model,
-    objective_of,
 )
-from limit_surface_ros.tools.training_data import ACCEPTED, CONTACT_SUFFIXES, check_input, is_bag
+from limit_surface_ros.tools.training_data import ACCEPTED, check_input
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,11 +41,6 @@ EXAMPLES = """examples:
   fit_surface contact.yaml --kind dissipation --terms 4 --output model.yaml
   fit_surface pushes.mcap --wrench-topic wrench --motion-topic pose --auto --output model.yaml
 """
-
-OF_CONTACTS = ("motions", "facet_loads", "load_noise", "motion_noise")
-CHOSEN_BY_AUTO = ("kind", "terms", "family", "objective", "velocity_weight", "starts")
-OF_BAGS = ("wrench_topic", "motion_topic", *asdict(Selection()))
-
 
 # Costs closer than this differ by rounding.
 NO_COST = 1e-12
@@ -122,42 +115,12 @@ def print_errors(label: str, errors: Errors) -> None:
     )
 
 
-def refuse_options_of_others(options: argparse.Namespace) -> None:
-    """Refuse what is for another kind of input or of fit than the one asked for.
-
-    Raises:
-        FileError: There is no such input.
-        RangeError: An option would do nothing.
-    """
-    top, suffix = parser(), check_input(options.input)
-    if suffix not in CONTACT_SUFFIXES:
-        refuse_unused(top, options, OF_CONTACTS, "for a contact file")
-    if suffix != ".csv":
-        refuse_unused(top, options, ["rows"], "for a CSV of pushes")
-    if not is_bag(options.input):
-        refuse_unused(top, options, OF_BAGS, "for a bag")
-    if options.auto:
-        refuse_unused(top, options, CHOSEN_BY_AUTO, "what --auto chooses")
-    else:
-        refuse_unused(top, options, ["folds", "support"], "for --auto")
-        if options.kind != "power_sum":
-            refuse_unused(top, options, ["family"], "for --kind power_sum")
-        if options.kind == "polynomial":
-            refuse_unused(top, options, ["terms"], "not for --kind polynomial")
-        objective = objective_of(options, recorded=suffix not in CONTACT_SUFFIXES)
-        if objective == "second":
-            of_others = "not for --objective second, which has two terms of its own"
-            refuse_unused(top, options, ["terms", "family"], of_others)
-        if objective in WITHOUT_MOTIONS:
-            refuse_unused(top, options, ["velocity_weight"], f"not for the objective {objective}")
-
-
 def run(options: argparse.Namespace) -> None:
     """Read, fit, write, report."""
-    check_output(options.output, MODEL_SUFFIXES, [options.input])
+    check_output(options.output, YAML_SUFFIXES, [options.input])
     refuse_empty(options, ["name", "frame_id"])
     check_fit_options(options)
-    refuse_options_of_others(options)
+    refuse_options_of_others(parser(), options, [check_input(options.input)])
     parts = "fits" if options.auto else "starts"
     with process_pool(options.workers) as executor, progress_bar(parts) as progress:
         fitted = fit_model(

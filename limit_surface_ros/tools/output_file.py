@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from pathlib import Path
 
-MODEL_SUFFIXES = (".yaml", ".yml")
-
 
 def check_output(output: Path, suffixes: Sequence[str], inputs: Iterable[Path] = ()) -> None:
     """Refuse an output that could not be written after the work, or that is an input.

@@ -13,13 +13,13 @@ from limit_surface_ros.errors import DataError
 from limit_surface_ros.files.contact_file import read_contact
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.files.surface_file import read_surface_model
+from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
 from limit_surface_ros.plots.canvas import save_figure
 from limit_surface_ros.plots.surface_view import draw_surfaces
 from limit_surface_ros.surface.sampling import facet_loads, random_motions
 from limit_surface_ros.tools.picture_options import add_picture_options, check_picture
 from limit_surface_ros.tools.program import run_program
 from limit_surface_ros.tools.same_point import About, require_one_point
-from limit_surface_ros.tools.training_data import CONTACT_SUFFIXES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -71,7 +71,7 @@ def loads_of(path: Path) -> tuple[Floats, About | None]:
     Raises:
         FileError: The file is no valid one of its suffix.
     """
-    if path.suffix.lower() not in CONTACT_SUFFIXES:
+    if path.suffix.lower() not in YAML_SUFFIXES:
         return read_pushes(path).pairs.wrenches, None
     contact = read_contact(path)
     loads = [random_motions(contact.surface, MOTIONS, 0).wrenches]

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from limit_surface_ros.errors import LimitSurfaceError
+from limit_surface_ros.start import INTERRUPTED
 
 if TYPE_CHECKING:
     import argparse
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 
 FAILED = 1
 USAGE_ERROR = 2
-INTERRUPTED = 130
 
 
 def run_program(

@@ -22,11 +22,12 @@ from limit_surface_ros.fitting.second_approximation import fit_second_approximat
 from limit_surface_ros.surface.power_sum import thesis_exponents
 from limit_surface_ros.tools.given_options import check_ranges
 from limit_surface_ros.tools.training_data import (
-    CONTACT_SUFFIXES,
+    BAG,
+    CONTACT,
     Simulation,
     check_input,
     check_scaling,
-    is_bag,
+    naming,
     training_data_of_bag,
     training_data_of_contact,
     training_data_of_pushes,
@@ -61,8 +62,6 @@ RANGES = {
 }
 # Frame of a model whose data state none.
 DEFAULT_FRAME = "object"
-# Objectives that look at loads alone.
-WITHOUT_MOTIONS = ("J1", "forces", "least-squares")
 # What each kind can be fitted by, the default first.
 OBJECTIVES: dict[str, tuple[str, ...]] = {
     "power_sum": ("J2", "J1", "second"),
@@ -245,12 +244,9 @@ def fit_model(
         FileError: The input is absent or not valid.
         LimitSurfaceError: The data cannot support the fit, or an option is out of range.
     """
-    try:
-        data = read_input(path, options)
+    data = read_input(path, options)
+    with naming(path):
         result = fit(options, data, Search(options.starts, options.seed, executor, progress))
-    except DataError as error:
-        named = str(error).startswith(f"{path}: ")
-        raise error if named else DataError(f"{path}: {error}") from None
     model = SurfaceModel(
         name=name or data.name or default_name,
         surface=result.surface,
@@ -267,15 +263,16 @@ def read_input(path: Path, options: argparse.Namespace) -> TrainingData:
 
     Raises:
         FileError: The input is absent or not valid.
-        DataError: It has not the rows or topics that the options ask for.
+        DataError: It is of no size that a model file takes, or has not the rows or topics that
+            the options ask for; the message names the input.
     """
-    suffix = check_input(path)
-    if is_bag(path):
+    kind = check_input(path)
+    if kind == BAG:
         rules = {rule: getattr(options, rule) for rule in asdict(Selection())}
         return training_data_of_bag(
             path, options.wrench_topic, options.motion_topic, Selection(**rules)
         )
-    if suffix in CONTACT_SUFFIXES:
+    if kind == CONTACT:
         simulation = Simulation(
             options.motions,
             options.facet_loads,
@@ -312,8 +309,6 @@ def fit_as_told(
     options: argparse.Namespace, data: TrainingData, scaling: Scaling, search: Search
 ) -> FitResult:
     """Fit the kind and the objective that the options name."""
-    if options.bootstrap:
-        raise RangeError("--bootstrap refits what --auto has chosen: give both")
     objective, weight = objective_of(options, data.recorded), float(options.velocity_weight)
     pairs = data.training
     if options.kind == "polynomial":

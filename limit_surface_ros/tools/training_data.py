@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,18 +12,20 @@ from limit_surface_ros.files.bag_pushes import Selection, read_bag_pushes
 from limit_surface_ros.files.contact_file import read_contact
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.files.surface_file import LARGEST_SCALE
+from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
 from limit_surface_ros.fitting.simulation import simulated_pairs
 from limit_surface_ros.surface.point_contacts import PointContacts
 from limit_surface_ros.surface.sampling import random_motions
 from limit_surface_ros.surface.scaling import Scaling
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from limit_surface_ros.surface.pairs import Pairs
 
-CONTACT_SUFFIXES = (".yaml", ".yml")
-SUFFIXES = (*CONTACT_SUFFIXES, ".csv")
+# What an input can be, as messages call it.
+CONTACT, PUSHES, BAG = "a contact file", "a CSV of pushes", "a bag"
+SUFFIXES = (*YAML_SUFFIXES, ".csv")
 BAG_SUFFIXES = (".mcap", ".db3")
 ACCEPTED = "a contact file (.yaml, .yml), recorded pushes (.csv), or a ROS 2 bag"
 
@@ -54,6 +57,19 @@ class TrainingData:
     reference_point: tuple[float, float] = (0.0, 0.0)
     recorded: bool = False
     about: Mapping[str, Any] = field(default_factory=dict)
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Name the file of the data in errors of the block, which knows nothing of files.
+
+    Raises:
+        DataError: The block raised one; this one names the file, too.
+    """
+    try:
+        yield
+    except DataError as error:
+        raise DataError(f"{path}: {error}") from None
 
 
 def row_numbers(text: str, count: int) -> list[int]:
@@ -96,7 +112,8 @@ def training_data_of_pushes(path: Path, selected: str | None) -> TrainingData:
         DataError: There are no such rows.
     """
     pushes = read_pushes(path)
-    rows = None if selected is None else row_numbers(selected, len(pushes.pairs))
+    with naming(path):
+        rows = None if selected is None else row_numbers(selected, len(pushes.pairs))
     training = pushes.pairs if rows is None else pushes.rows(rows)
     others = len(pushes.pairs) - len(training)
     support = pushes.support()
@@ -163,7 +180,8 @@ def training_data_of_contact(
     if characteristic_length is not None:
         scaling = Scaling(characteristic_length, exact.scaling.friction_force)
         exact = PointContacts(exact.points, exact.friction_limits, scaling)
-    check_scaling(exact.scaling)
+    with naming(path):
+        check_scaling(exact.scaling)
     training = simulated_pairs(
         exact,
         simulation.motions,
@@ -205,7 +223,7 @@ def check_scaling(scaling: Scaling) -> None:
 
 
 def check_input(path: Path) -> str:
-    """Return the suffix of an input of a kind that is read, in small letters.
+    """Return what an input is, by its name: CONTACT, PUSHES or BAG.
 
     Raises:
         FileError: There is no such file, or it is of no such kind.
@@ -225,7 +243,14 @@ def check_input(path: Path) -> str:
     elif suffix not in (*SUFFIXES, *BAG_SUFFIXES):
         found = f"files that end in {suffix} are" if suffix else "a file without a suffix is"
         raise FileError(f"{path}: {found} not known; accepted is {ACCEPTED}")
-    return suffix
+    return kind_of_input(path)
+
+
+def kind_of_input(path: Path) -> str:
+    """Return what an input that is there is, by its name: CONTACT, PUSHES or BAG."""
+    if is_bag(path):
+        return BAG
+    return CONTACT if path.suffix.lower() in YAML_SUFFIXES else PUSHES
 
 
 def is_bag_folder(path: Path) -> bool:

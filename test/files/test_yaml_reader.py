@@ -90,6 +90,10 @@ def test_a_number_of_an_array_below_its_bound_is_named_with_its_place(section_of
         ("a: 1\nb: 2\na: 3", "line 3, column 1: key 'a' is given twice"),
         ("a: !!python/object:os.system {}", "could not determine a constructor"),
         ("a: \x07", "is not YAML"),
+        ("a: !!bool maybe", "a tag such as !!bool stands before what is none; accepted are"),
+        ("a: !!timestamp x", "a tag such as"),
+        ("a: !!int ''", "a tag such as"),
+        ("a: !!set [1]", "a tag such as"),
     ],
 )
 def test_text_that_is_no_mapping_is_refused_with_its_place(section_of, text, message):

@@ -140,6 +140,15 @@ def test_a_model_file_without_its_parameter_is_told_how_to_be_given():
     assert "-p \"model_files:=['model.yaml']\"" in output
 
 
+def test_nodes_of_one_process_that_ask_for_different_executors_do_not_start():
+    with Program("force_motion_nodes", "--ros-args", "-p", "decay:executor:=events") as program:
+        code, output = program.ended()
+    assert code == 1
+    assert "executor is single_threaded for limit_surface, events for decay; the nodes" in output
+    assert "-p executor:=events" in output
+    assert "Traceback" not in output
+
+
 def test_a_file_that_both_nodes_of_a_process_were_given_is_told_how_to_give_to_one(model_file):
     _, path = model_file()
     files = f"model_files:=['{path}']"

@@ -70,6 +70,19 @@ def test_a_bad_value_is_refused_and_the_old_one_stays(node, name, value, told):
     assert node.values[name] == used
 
 
+def test_a_defect_that_a_new_value_meets_is_answered_and_the_old_value_stays(node):
+    def broken_for_two(values):
+        if values["input_timeout"] == 2.0:
+            raise OSError("the disk is gone")
+        return lambda: None
+
+    node.values.concern(["input_timeout"], broken_for_two)
+    (result,) = node.set_parameters([Parameter("input_timeout", value=2.0)])
+    assert not result.successful
+    assert "please report it: OSError: the disk is gone" in result.reason
+    assert node.values["input_timeout"] == node.get_parameter("input_timeout").value == 0.5
+
+
 def test_an_empty_list_of_models_is_refused(node):
     empty = Parameter("model_files", Parameter.Type.STRING_ARRAY, [])
     (result,) = node.set_parameters([empty])

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from catalogue_helpers import write_objects
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
 from limit_surface_ros.surface.point_contacts import PointContacts
 from limit_surface_ros.surface.polynomial import Polynomial
@@ -121,6 +122,8 @@ def test_the_distributions_are_drawn(contact, tmp_path, capsys):
         (["--fit", "auto:3"], "--fit auto takes no number of terms; got 'auto:3'"),
         (["--fit", "polynomial:3"], "--fit polynomial takes no number of terms"),
         (["--fit", "second:5"], "--fit second takes no number of terms"),
+        (["--fit", "norms:2", "--auto"], "--auto does nothing here: it is written --fit auto"),
+        (["--fit", "norms:2", "--folds", "3"], "--folds does nothing here: it is for --fit auto"),
         (["--fit", "norms:2", "--seed", "-1"], "--seed must be from 0"),
         (["--fit", "norms:2", "--picture", "x.foo"], "x.foo: cannot be written: must end in .png"),
         (["--fit", "norms:2", "--picture", "no/x.png"], "its folder does not exist"),
@@ -130,6 +133,17 @@ def test_the_distributions_are_drawn(contact, tmp_path, capsys):
 def test_what_cannot_be_compared_is_refused(contact, capsys, arguments, message):
     assert main([str(contact), *arguments]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_data_that_cannot_be_read_as_asked_are_told_with_their_file(contact, tmp_path, capsys):
+    write_objects(tmp_path / "pushes", 1)
+    contact.write_text(contact.read_text().replace("0.08", "1.0e+99"))
+    for data, options, message in (
+        (tmp_path / "pushes" / "object_00.csv", ["--rows", "70"], "--rows: there is no row 70"),
+        (contact, [], "the data make a characteristic length [m]"),
+    ):
+        assert main([str(data), "--fit", "thesis:1", *options]) == 2
+        assert f"error: {data}: {message}" in capsys.readouterr().err
 
 
 def test_a_model_that_is_not_convex_is_warned_of_in_one_plain_line(contact, tmp_path, capsys):

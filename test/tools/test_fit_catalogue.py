@@ -8,8 +8,11 @@ import subprocess
 import pytest
 
 from catalogue_helpers import OPTIONS, matrices, write_objects
+from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.tools import fit_catalogue, fit_surface
+from limit_surface_ros.tools.fit_options import refuse_options_of_others
+from limit_surface_ros.tools.training_data import CONTACT, PUSHES
 from process_helpers import group_is_gone, started, until
 
 MODULE = "limit_surface_ros.tools.fit_catalogue"
@@ -100,6 +103,37 @@ def test_options_are_looked_at_before_any_object_is(tmp_path, capsys, options, m
     assert message in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--motions", "60"], "--motions does nothing here: it is for a contact file"),
+        (["--min-force", "1"], "--min-force does nothing here: it is for a bag"),
+        (["--auto"], "--terms does nothing here: it is what --auto chooses"),
+        (["--bootstrap", "5"], "--bootstrap does nothing here: it is for --auto"),
+        (["--kind", "polynomial"], "--terms does nothing here: it is not for --kind polynomial"),
+        (["--objective", "convex"], "--objective convex is not for --kind power_sum"),
+        (["--objective", "J1", "--velocity-weight", "2"], "it is not for the objective J1"),
+    ],
+)
+def test_options_that_do_nothing_for_any_object_are_refused_before_the_work(
+    folder, tmp_path, capsys, options, message
+):
+    assert run(folder, tmp_path / "models", *options) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert message in line
+    assert not (tmp_path / "models").exists()
+
+
+def test_an_option_that_counts_for_some_objects_is_accepted():
+    top = fit_catalogue.parser()
+    weighed = ["--kind", "dissipation", "--velocity-weight", "2"]
+    for given in (["--motions", "60"], ["--rows", "0-9"], weighed):
+        options = top.parse_args(["in", "-o", "out", *given])
+        refuse_options_of_others(top, options, {CONTACT, PUSHES})
+    with pytest.raises(RangeError, match="not for the objective forces"):
+        refuse_options_of_others(top, options, {CONTACT})
+
+
 def test_finished_models_are_kept_until_their_input_or_the_options_change(
     folder, tmp_path, capsys
 ):
@@ -124,6 +158,16 @@ def test_finished_models_are_kept_until_their_input_or_the_options_change(
     assert all(time != second[name] for name, time in times(output).items())
     run(folder, output, "--objective", "J1", "--refit")
     assert "4 finished before" not in capsys.readouterr().out.splitlines()[-2]
+
+
+def test_models_of_another_version_are_fitted_anew(folder, tmp_path, capsys, monkeypatch):
+    output = tmp_path / "models"
+    run(folder, output)
+    monkeypatch.setattr(fit_catalogue, "__version__", "999.0.0")
+    for told in ("0 finished before, 4 to fit", "4 finished before, 0 to fit"):
+        capsys.readouterr()
+        assert run(folder, output) == 0
+        assert told in capsys.readouterr().out
 
 
 def test_an_interrupted_run_leaves_whole_models_and_goes_on(tmp_path, capsys):

@@ -132,7 +132,7 @@ def test_the_automatic_fit_stores_its_choice_and_its_bootstrap(pushes, tmp_path)
             "--objective forces is not for --kind power_sum, which takes J2",
         ),
         (["--kind", "dissipation", "--objective", "J2"], "which takes forces, directions, both"),
-        (["--bootstrap", "5"], "give both"),
+        (["--bootstrap", "5"], "--bootstrap does nothing here: it is for --auto"),
         (["--motions", "300"], "--motions does nothing here: it is for a contact file"),
         (["--wrench-topic", "/w"], "--wrench-topic does nothing here: it is for a bag"),
         (["--kind", "dissipation", "--family", "norms"], "it is for --kind power_sum"),
@@ -143,6 +143,7 @@ def test_the_automatic_fit_stores_its_choice_and_its_bootstrap(pushes, tmp_path)
             ["--kind", "polynomial", "--velocity-weight", "2"],
             "--velocity-weight does nothing here: it is not for the objective least-squares",
         ),
+        (["--kind", "polynomial", "--starts", "3"], "--starts does nothing here: it is not for"),
         (["--objective", "J1", "--velocity-weight", "2"], "not for the objective J1"),
         (["--characteristic-length", "0"], "must be"),
         (["--name", ""], "--name must not be empty"),
@@ -225,6 +226,21 @@ def test_what_is_wrong_with_the_data_is_told_with_their_file(pushes, tmp_path, c
     assert "pushes.csv: 3 pairs cannot determine 18 parameters" in capsys.readouterr().err
     assert main([str(pushes), "-o", str(tmp_path / "m.yaml"), "--auto"]) == 2
     assert "pushes.csv: 3 pushes are too few, even for a fit" in capsys.readouterr().err
+
+
+def test_an_error_names_the_file_of_the_data_once(pushes, tmp_path, capsys):
+    contact, bag = tmp_path / "contact.yaml", tmp_path / "pushes.mcap"
+    contact.write_text(CONTACT.replace("0.08", "1.0e+99"))
+    bag.touch()
+    for data, options in (
+        (pushes, ["--rows", "70"]),
+        (pushes, ["--rows", "0-2"]),
+        (pushes, ["--auto", "--support"]),
+        (contact, []),
+        (bag, []),
+    ):
+        assert main([str(data), "-o", str(tmp_path / "m.yaml"), *options]) == 2
+        assert capsys.readouterr().err.count(str(data)) == 1
 
 
 def test_data_of_a_size_that_no_model_file_takes_are_refused(tmp_path, capsys):

@@ -1,11 +1,16 @@
 """A program whose output goes nowhere ends without a traceback."""
 
 import os
+import runpy
 import subprocess
 import sys
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
+
+from limit_surface_ros import start
+from process_helpers import REPOSITORY
 
 PROGRAM = [sys.executable, "-m", "limit_surface_ros.tools.fit_decay"]
 FIT = [*PROGRAM, "f1", "--terms", "1", "--method", "esprit"]
@@ -30,3 +35,44 @@ def test_a_full_disk_is_told_in_one_line():
     assert ended.returncode == 1
     assert ended.stderr.splitlines()[-1].startswith("fit_decay: error: ")
     assert "Traceback" not in ended.stderr
+
+
+@pytest.mark.parametrize("package", ["tools", "nodes"])
+def test_an_interrupt_while_a_program_still_imports_is_told_in_one_line(tmp_path, package):
+    program = {"tools": "fit_surface", "nodes": "demo"}[package]
+    # Whichever is imported first is interrupted.
+    stand_in = (
+        "import os, signal, time\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "os.kill(os.getpid(), signal.SIGINT)\n"
+        "time.sleep(20)\n"
+    )
+    for name in ("numpy", "rclpy", "geometry_msgs"):
+        (tmp_path / f"{name}.py").write_text(stand_in)
+    command = f"import sys; from limit_surface_ros.start import {package}; "
+    command += f"sys.exit({package}.{program}())"
+    paths = os.pathsep.join([str(tmp_path), str(REPOSITORY), os.environ.get("PYTHONPATH", "")])
+    ended = subprocess.run(
+        [sys.executable, "-c", command],
+        env=os.environ | {"PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=30,
+    )
+    assert ended.returncode == 130
+    assert ended.stderr == f"{program}: interrupted\n"
+
+
+def test_every_installed_program_starts_where_interrupts_are_quiet(monkeypatch):
+    setuptools = pytest.importorskip("setuptools", reason="setuptools is not installed")
+    given = {}
+    monkeypatch.setattr(setuptools, "setup", lambda **options: given.update(options))
+    monkeypatch.chdir(REPOSITORY)
+    programs = runpy.run_path("setup.py")["PROGRAMS"]
+    scripts = [script.split(" = ") for script in given["entry_points"]["console_scripts"]]
+    assert len(scripts) == len(programs) > 0
+    for name, place in scripts:
+        run = EntryPoint(name, place, "console_scripts").load()
+        assert run.func is start.run
+        assert ".".join(run.args) == programs[name]
