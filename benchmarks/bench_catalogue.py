@@ -19,7 +19,7 @@ from limit_surface_ros.surface.sampling import random_motions
 from limit_surface_ros.surface.scaling import Scaling
 
 CORNERS = np.array([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]])
-OBJECTS, PAIRS, ROUNDS = 12, 2900, 2
+OBJECTS, PAIRS, ROUNDS = 8, 2900, 3
 # Many objects of next to no fit each: what is left is reading, handing over and writing.
 SMALL_OBJECTS, SMALL_PAIRS = 500, 12
 SMALL_FIT = ["--terms", "1", "--objective", "J1", "--starts", "1"]

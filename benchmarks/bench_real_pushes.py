@@ -66,7 +66,7 @@ def test_angle(task: tuple[str, str, list[int]]) -> tuple[float, float]:
 def main() -> int:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--splits", type=int, default=10)
+    parser.add_argument("--splits", type=int, default=8)
     splits = parser.parse_args().splits
     print(__doc__)
     if not DATA.is_dir():

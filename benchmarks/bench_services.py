@@ -48,7 +48,7 @@ from limit_surface_ros.nodes.service_client import ServiceClient
 
 SINGLE_CALLS = 1500
 BATCH_CALLS = 100
-KIND_CALLS = 400
+KIND_CALLS = 300
 KIND_BATCHES = 30
 ROWS = 10_000
 MESSAGES = 4000

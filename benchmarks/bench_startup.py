@@ -21,6 +21,7 @@ from node_processes import OURS, isolate, process, resident, wrench_message
 from std_srvs.srv import Trigger
 
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
+from limit_surface_ros.nodes.service_client import AGAIN
 from limit_surface_ros.surface.power_sum import PowerSum
 
 if TYPE_CHECKING:
@@ -61,10 +62,14 @@ def first_answer(
                 if running.poll() is not None or time.perf_counter() - begin > PATIENCE:
                     raise RuntimeError(f"{shlex.join(command)} does not answer")
                 time.sleep(0.002)
-            future = client.call_async(request)
-            rclpy.spin_until_future_complete(asker, future, timeout_sec=PATIENCE)
+            answer = None
+            while answer is None and time.perf_counter() - begin < PATIENCE:
+                # A node that has not discovered who asks yet drops its answer: ask again.
+                future = client.call_async(request)
+                rclpy.spin_until_future_complete(asker, future, timeout_sec=AGAIN)
+                answer = future.result()
             seconds = time.perf_counter() - begin
-            return seconds, resident(running.pid) / 1024, future.result()
+            return seconds, resident(running.pid) / 1024, answer
     finally:
         asker.destroy_node()
         rclpy.shutdown()

@@ -110,8 +110,9 @@ class SupportTable:
 
     def points(self, normals: Floats) -> tuple[Floats, Bools]:
         """Return points (3, m) for vectors (3, m), none zero, and which are certain (m,)."""
+        # A normal below the equator has the place of its opposite.
         sign = np.copysign(1.0, normals[2])
-        place = _chart(normals * sign)
+        place = np.asarray(normals[:2] / (sign * _lengths(normals) + normals[2]))
         cell, within = _cells_of(place)
         certain = self._useful.take(cell)
         # What runs out of digits or numbers on the way ends as not certain.
@@ -261,9 +262,12 @@ def _normals(places: Floats) -> Floats:
 
 def _chart(normals: Floats) -> Floats:
     """Return (a, b), shape (2, m), of normals (3, m) that are not (0, 0, -1)."""
-    stretch = np.sqrt(squared_lengths(normals))
-    stretch += normals[2]
-    return np.asarray(normals[:2] / stretch)
+    return np.asarray(normals[:2] / (_lengths(normals) + normals[2]))
+
+
+def _lengths(vectors: Floats) -> Floats:
+    """Return the lengths (m,) of vectors (3, m)."""
+    return np.sqrt(squared_lengths(vectors))
 
 
 def _sum_of_products(first: Any, second: Any, out: Any) -> None:
