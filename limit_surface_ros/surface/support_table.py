@@ -42,6 +42,8 @@ _SHORT_STEP, _LONG_STEP = 1e-10, 1e-5
 # are known of few places in a cell, so that more is taken.
 _ERROR = 3e-11
 _OFF = 1e-12
+# Length of a step that never leads from the surface by more than rounding.
+_NEAR = 1e-7
 _ROUNDING = 1e-15
 _MORE = 4.0
 # Part of a surface's size by which points of one sheet differ at most, found in two ways.
@@ -137,6 +139,7 @@ class SupportTable:
         last_step = self._last_step.take(cell)
         certain = away <= last_step
         todo = np.flatnonzero(~certain)
+        before = away.take(todo)
         for _ in range(_STEPS - 1):
             if len(todo) == 0:
                 break
@@ -144,8 +147,10 @@ class SupportTable:
                 *(each.take(todo, axis=1) for each in (points, place, local))
             )
             done = away <= last_step.take(todo)
+            # Or the step before has left so little that this one leaves nothing.
+            done |= (away <= _NEAR) & (_MORE * away * away <= _ERROR * before)
             certain[todo] = done
-            todo = todo[~done]
+            todo, before = todo[~done], away[~done]
         return points, certain
 
     def _last_steps(self, normals: Floats) -> Floats:
