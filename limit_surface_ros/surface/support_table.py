@@ -29,6 +29,7 @@ _CELLS = 80
 # Powers of x and y in a cell's polynomial, those of y one after the other for each of x.
 _DEGREE = 5
 _POWERS = [(i, j) for i in range(_DEGREE + 1) for j in range(_DEGREE + 1 - i)]
+_PLANE = [_POWERS.index(powers) for powers in ((0, 0), (1, 0), (0, 1))]
 # Derivatives along x and y of what is read: the height, its slopes and its bends.
 _ORDERS = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
 # Vectors for which one is solved to make a table.
@@ -93,7 +94,10 @@ class SupportTable:
         slopes = points[:2] - points[2] * places
         samples = np.array([height, *slopes / _CELLS]).reshape(3, 2 * _CELLS + 1, -1)
         coefficients, misfit = _quintics(samples)
-        # Rounding to single precision is mended by the steps that follow.
+        # Height and slopes in the middle of a cell are most of those elsewhere in it. What is lost
+        # of the rest in single precision is mended by the steps that follow.
+        self._planes = coefficients[_PLANE]
+        coefficients[_PLANE] = 0.0
         with np.errstate(over="ignore", under="ignore"):
             self._coefficients = coefficients.astype(np.float32)
         # A cell that proves nothing, as within a corner's cone, is not worth reading.
@@ -201,20 +205,30 @@ class SupportTable:
             within: The places within these, from -1 to 1, shape (2, m).
         """
         local: Any = np.empty((6, len(cell)), dtype=np.float32)
-        local[:2] = place
-        a, b, lift = local[:3]
-        np.divide(2.0, a * a + b * b + np.float32(1.0), out=lift)
-        (height, slope_a, slope_b), local[3:] = self._derivatives(cell, within)
-        z = lift * (height - a * slope_a - b * slope_b)
+        bent, local[3:] = self._derivatives(cell, within)
+        height, slope_a, slope_b = self._planes.take(cell, axis=1)
+        (x, y), (a, b) = within, place
+        height += slope_a * x
+        height += slope_b * y
+        height += bent[0]
+        slope_a += bent[1]
+        slope_b += bent[2]
+        slope_a *= _CELLS
+        slope_b *= _CELLS
+        lift = 2.0 / (1.0 + a * a + b * b)
+        local[:2], local[2] = place, lift
         points: Floats = np.empty((3, len(cell)))
-        np.add(slope_a, a * z, out=points[0])
-        np.add(slope_b, b * z, out=points[1])
-        points[2] = z
+        z = points[2]
+        np.multiply(lift, height - a * slope_a - b * slope_b, out=z)
+        np.multiply(place, z, out=points[:2])
+        points[0] += slope_a
+        points[1] += slope_b
         return points, local
 
     def _derivatives(self, cell: Places, within: Floats) -> tuple[Any, Any]:
-        """Return h, h_a, h_b (3, m) and h_aa, h_ab, h_bb (3, m) at places within cells.
+        """Return what bends at places within cells: h, h_a, h_b (3, m), h_aa, h_ab, h_bb (3, m).
 
+        The first three are what is beyond the plane in the cell's middle, in its own units.
         A polynomial that holds its own derivatives at the middle of the cell has those elsewhere
         as sums of the same products, but of later coefficients.
         """
@@ -240,7 +254,6 @@ class SupportTable:
         for place_of, (order_a, order_b) in zip(found.reshape(6, -1), _ORDERS, strict=True):
             last = _DEGREE + 1 - order_b
             _sum_of_products(sums[order_b, order_a:last], in_a[: last - order_a], place_of)
-        found[0, 1:] *= _CELLS
         found[1] *= _CELLS**2
         return found[0], found[1]
 

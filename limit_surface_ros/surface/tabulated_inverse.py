@@ -49,7 +49,7 @@ class TabulatedInverse:
         hard = np.flatnonzero(~certain)
         if len(hard):
             points[:, hard] = self._inverse.solve(normals[:, hard])[0]
-        return points, (normals * points).sum(axis=0)
+        return points, np.einsum("im,im->m", normals, points)
 
     def starts_of_one(self, normal: Floats) -> Floats:
         """Return points (s, 3) that lead smoothly to the answer for one vector (3,), if any do."""
