@@ -62,7 +62,7 @@ class FormTerms:
     def values_and_normals(self, twists: Floats) -> tuple[Floats, Floats]:
         """Return D (m,) and its gradient (3, m), as `gradient` does."""
         roots = self._stacked_roots.astype(twists.dtype, copy=False)
-        images = (roots @ twists).reshape(-1, 3, twists.shape[1])
+        images = roots.dot(twists).reshape(-1, 3, twists.shape[1])
         norms = np.sqrt(np.einsum("kcm,kcm->km", images, images))
         values = np.add.reduce(norms)
         # The least of all norms is cheaper than one bound for each, and is most often enough.
@@ -70,7 +70,7 @@ class FormTerms:
             length = np.abs(twists).max(axis=0)
             norms[norms <= self._least[:, np.newaxis] * length] = np.inf
         images /= norms[:, np.newaxis]
-        return values, np.asarray(roots.T @ images.reshape(-1, twists.shape[1]))
+        return values, np.asarray(roots.T.dot(images.reshape(-1, twists.shape[1])))
 
     def values(self, twists: Floats) -> Floats:
         """Return D (m,)."""
