@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-import tempfile
+import secrets
 from pathlib import Path
 
 from limit_surface_ros.errors import FileError
@@ -26,17 +26,12 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
         target = Path(path).resolve()
         if target.exists() and not target.is_file():
             raise FileError(f"{path}: cannot be written: it is no regular file")
-        with tempfile.NamedTemporaryFile(
-            "wb", dir=target.parent, prefix=f".{target.name}.", delete=False
-        ) as stream:
-            part = Path(stream.name)
+        # Named before it is there, so that an interrupt at any moment finds what to take away.
+        part = target.with_name(f".{target.name}.{secrets.token_hex(8)}")
+        with part.open("xb") as stream:
             stream.write(content.encode() if isinstance(content, str) else content)
             stream.flush()
             os.fsync(stream.fileno())
-        # Temporary files are private; a model file is for everybody whom the umask lets in.
-        umask = os.umask(0)
-        os.umask(umask)
-        part.chmod(0o666 & ~umask)
         part.replace(target)
     except OSError as error:
         raise FileError(f"{path}: cannot be written: {error.strerror or error}") from None

@@ -2,6 +2,7 @@
 
 import os
 import stat
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -204,6 +205,25 @@ def test_a_file_that_cannot_be_written_leaves_the_old_one_and_no_litter(tmp_path
     assert [path.name for path in folder.iterdir()] == ["model.yaml"]
     with pytest.raises(FileError, match="No such file or directory"):
         write_atomically(tmp_path / "absent" / "model.yaml", "text")
+
+
+def test_an_interrupt_as_a_file_comes_to_be_leaves_the_old_one_and_no_litter(
+    tmp_path, monkeypatch
+):
+    path = tmp_path / "model.yaml"
+    path.write_text("old")
+
+    def interrupted(self, *arguments):
+        open_of_path(self, *arguments).close()
+        raise KeyboardInterrupt
+
+    open_of_path = Path.open
+    monkeypatch.setattr(Path, "open", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_atomically(path, "new")
+    monkeypatch.undo()
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_written_file_has_the_permissions_that_the_umask_leaves(tmp_path):

@@ -63,7 +63,7 @@ KINDS = ["norms", "powers", "dissipation", "points", "many points", "polynomial"
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=2, deadline=None)
 @given(seed=st.integers(0, 10_000))
 def test_many_vectors_are_answered_as_few_are(kind, seed):
     surface = surface_of(kind, seed)
@@ -113,7 +113,7 @@ def test_a_corner_of_a_dissipation_model_is_answered_alone_after_a_batch():
     )
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(seed=st.integers(0, 10_000))
 def test_the_twist_of_a_wrench_from_the_table_is_the_twist_asked_for(seed):
     # Of full rank: at a corner a wrench has many twists.
