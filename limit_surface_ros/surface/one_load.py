@@ -64,14 +64,8 @@ def gauge_of_one(terms: Sequence[Term], load: Vector) -> float | None:
     return None if t is None else exp(-t)
 
 
-def is_plain(load: Vector) -> bool:
-    """Return whether no square of a load of this size runs out of numbers."""
-    x, y, z = load
-    return _TINY < x * x + y * y + z * z < _HUGE
-
-
 def norm_of_one(terms: Sequence[Term], load: Vector) -> float:
-    """Return the sum of the terms' norms |R_i f|, whatever their exponents, for a plain load."""
+    """Return the sum of the terms' norms |R_i f|, whatever their exponents."""
     x, y, z = load
     total = 0.0
     for _, _, a, b, c, d, e, f, g, h, i in terms:

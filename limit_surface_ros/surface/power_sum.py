@@ -13,9 +13,7 @@ from limit_surface_ros.checks import as_floats, as_vectors
 from limit_surface_ros.errors import RangeError, ShapeError
 from limit_surface_ros.surface.one_load import (
     gauge_of_one,
-    is_plain,
     norm_gradient_of_one,
-    norm_of_one,
     normal_and_gauge_of_one,
     one_load_terms,
 )
@@ -180,8 +178,9 @@ class PowerSum(ScaledSurface):
         return self._roots.reshape(-1, 3)
 
     def _load_factor_of_one(self, wrench: Vector) -> float | None:
-        if self._is_norm and is_plain(wrench):
-            return norm_of_one(self._one_load_terms, wrench)
+        if self._is_norm:
+            found = self._twist_and_load_factor_of_one(wrench)
+            return None if found is None else found[1]
         return gauge_of_one(self._one_load_terms, wrench)
 
     def _twist_of_one(self, wrench: Vector) -> Vector | None:

@@ -141,3 +141,14 @@ def test_a_surface_is_sent_to_another_process_without_what_it_has_worked_out(sur
     np.testing.assert_allclose(
         pickle.loads(sent).load_factor(wrenches), surface.load_factor(wrenches), rtol=1e-12
     )
+
+
+@pytest.mark.parametrize("exponents", [[0.5], [1.0], [0.5, 0.5], [1.0, 0.5]])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_load_that_nothing_limits_has_the_factor_zero_alone_too(exponents, seed):
+    free = np.random.default_rng(seed).standard_normal(3)
+    free /= np.linalg.norm(free)
+    limited = np.eye(3) - np.outer(free, free)
+    surface = PowerSum(np.array([limited] * len(exponents)), exponents)
+    assert surface.load_factor([free, 2.0 * free]).tolist() == [0.0, 0.0]
+    assert surface.load_factor(free) == 0.0
