@@ -249,7 +249,7 @@ class _Contact:
             moment, -reach, reach, _WIDTH * reach, _EXACT * unit, _STRAIGHT * unit * unit
         )
         below, above = moment(low), moment(high)
-        share = below / (below - above) if below < 0.0 < above else 0.5
+        share = below / (below - above) if below < above else 0.5
         wrench = (1.0 - share) * load(low) + share * load(high)
         fx, fy, _ = wrench.tolist()
         across = _turn(self.normal, (fx, fy))

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from limit_surface_ros.errors import RangeError, ShapeError, ZeroVectorError
 from limit_surface_ros.surface.contact_patch import ContactPatch
+from limit_surface_ros.surface.dissipation import Dissipation
 from limit_surface_ros.surface.point_contacts import PointContacts
 from limit_surface_ros.surface.power_sum import PowerSum
 from limit_surface_ros.surface.pushing import ContactMode, motion_cone, push
@@ -81,6 +82,20 @@ def test_a_body_that_turns_freely_about_its_one_support_is_pushed_with_the_force
     result = push(support, 0.05 * rng.standard_normal(2), [1.0, 0.0], 0.8, velocity)
     needed = support.wrench_of_twist(result.twist)
     assert result.wrench @ result.twist == pytest.approx(needed @ result.twist, rel=1e-7)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(("arm", "velocity"), [(0.5, (3.0, 4.0)), (1.0, (5.0, 12.0))])
+def test_a_push_whose_turning_rate_ends_the_range_that_is_searched_is_found(arm, velocity, side):
+    # Of unit friction for translations and turns alike: the rate is known, and the characteristic
+    # length makes it the first that is tried, whose moment about the contact is zero.
+    along, across = velocity[0], side * velocity[1]
+    rate = -arm * across / (1.0 + arm**2)
+    length = np.hypot(along, across) / abs(rate)
+    surface = Dissipation([np.diag([1.0, 1.0, 1.0 / length**2])], Scaling(length, 1.0))
+    result = push(surface, [-arm, 0.0], [1.0, 0.0], 50.0, [along, across])
+    assert result.mode is ContactMode.STICK
+    assert result.twist[2] == pytest.approx(rate, rel=1e-9)
 
 
 def test_a_pusher_that_moves_away_leaves():
