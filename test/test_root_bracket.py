@@ -54,3 +54,13 @@ def test_few_values_are_needed_where_the_function_is_smooth():
 
     root_bracket(function, -1.0, 1.0, 1e-13, exact=1e-14)
     assert len(calls) <= 15
+
+
+def test_a_bracket_ends_where_the_function_counts_as_straight():
+    def function(x):
+        return math.tanh(3.0 * (x - 0.1))
+
+    low, high = root_bracket(function, -1.0, 1.0, 1e-13, exact=1e-14, straight=1e-6)
+    assert low < 0.1 < high
+    assert high - low > 1e-13
+    assert -function(low) * function(high) <= 1e-6
