@@ -26,7 +26,7 @@ from rclpy.qos import QoSProfile
 from limit_surface_ros.decay.exponential_sum import ExponentialSum
 from limit_surface_ros.files.decay_file import DecayModel, write_decay_model
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
-from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
 
 if TYPE_CHECKING:
     from collections.abc import Callable

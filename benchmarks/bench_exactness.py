@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from limit_surface_ros.surface import measures, sampling, shapes
-from limit_surface_ros.surface.contact_patch import ContactPatch
-from limit_surface_ros.surface.dissipation import Dissipation
-from limit_surface_ros.surface.point_contacts import PointContacts
-from limit_surface_ros.surface.polynomial import Polynomial
-from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.contact.patch import ContactPatch
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+from limit_surface_ros.surface.kinds.polynomial import Polynomial
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 
 MANY = 100_000

@@ -12,11 +12,11 @@ from interleaved import interleaved
 from scipy.optimize import root
 
 from limit_surface_ros.surface import shapes
-from limit_surface_ros.surface.contact_patch import ContactPatch
-from limit_surface_ros.surface.dissipation import Dissipation
-from limit_surface_ros.surface.point_contacts import PointContacts
-from limit_surface_ros.surface.polynomial import Polynomial
-from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.contact.patch import ContactPatch
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+from limit_surface_ros.surface.kinds.polynomial import Polynomial
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 
 SCALING = Scaling(0.1, 5.0)

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limit_surface_ros.surface.polynomial import Polynomial
-from limit_surface_ros.surface.power_sum import PowerSum
-from limit_surface_ros.surface.quadratic_form import root_of
+from limit_surface_ros.surface.kinds.polynomial import Polynomial
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
+from limit_surface_ros.surface.linalg import root_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from limit_surface_ros.files.surface_file import read_surface_model
-from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.sampling import random_motions
 from limit_surface_ros.surface.scaling import Scaling
 

@@ -13,7 +13,7 @@ from limit_surface_ros.decay.exponential_sum import ExponentialSum
 from limit_surface_ros.files.decay_file import DecayModel, write_decay_model
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
 from limit_surface_ros.nodes.decay_node import DecayNode
-from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 
 SECOND = 1_000_000_000

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from limit_surface_ros.root_bracket import root_bracket
+from limit_surface_ros.bracket import root_bracket
 
 places = st.integers(-999, 999).map(lambda number: number / 1000)
 

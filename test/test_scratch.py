@@ -9,7 +9,7 @@ import pytest
 PROGRAM = """
 import resource
 import numpy as np
-from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
 
 def faults():
     return resource.getrusage(resource.RUSAGE_SELF).ru_minflt

@@ -10,8 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from limit_surface_ros.decay.delay_system import DelaySystem, from_quasi_polynomial
-from limit_surface_ros.decay.pieces import PiecewisePolynomial
+from limit_surface_ros.decay.delay.system import DelaySystem, from_quasi_polynomial
+from limit_surface_ros.decay.delay.pieces import PiecewisePolynomial
 from limit_surface_ros.decay.targets import Analytic, PiecewiseLinear, Target
 from limit_surface_ros.errors import RangeError
 

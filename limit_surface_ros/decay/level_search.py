@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from limit_surface_ros.root_bracket import root_bracket
+from limit_surface_ros.bracket import root_bracket
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats

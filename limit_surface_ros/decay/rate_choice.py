@@ -12,7 +12,7 @@ from limit_surface_ros.decay.exponential_sum import as_rates
 from limit_surface_ros.decay.response_fits import fit_response
 
 if TYPE_CHECKING:
-    from limit_surface_ros.decay.delay_system import DelaySystem
+    from limit_surface_ros.decay.delay.system import DelaySystem
     from limit_surface_ros.decay.exponential_sum import Complexes
     from limit_surface_ros.decay.targets import Target
 

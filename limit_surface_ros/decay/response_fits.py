@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.checks import as_positive
-from limit_surface_ros.decay.coefficient_fits import NORMS, solve
+from limit_surface_ros.decay.coefficients import NORMS, solve
 from limit_surface_ros.decay.exponential_sum import ExponentialSum, as_rates, real_basis
 from limit_surface_ros.decay.targets import Record
 from limit_surface_ros.errors import RangeError
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.decay.coefficient_fits import Criterion
+    from limit_surface_ros.decay.coefficients import Criterion
     from limit_surface_ros.decay.exponential_sum import Complexes
     from limit_surface_ros.decay.targets import Target
 

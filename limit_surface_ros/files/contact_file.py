@@ -26,8 +26,8 @@ import numpy as np
 from limit_surface_ros.files.yaml_reader import place_errors, read_yaml
 from limit_surface_ros.surface import pressure as pressures
 from limit_surface_ros.surface import shapes
-from limit_surface_ros.surface.contact_patch import ContactPatch, natural_scaling
-from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.contact.patch import ContactPatch, natural_scaling
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.files.yaml_reader import Section
-    from limit_surface_ros.surface.pressure import Pressure
-    from limit_surface_ros.surface.shapes import Cells
+    from limit_surface_ros.surface.contact.pressure import Pressure
+    from limit_surface_ros.surface.contact.shapes import Cells
 
 SCHEMA = 1
 # Cells of a patch at most: more take gigabytes, and loads are exact to 1e-6 long before.

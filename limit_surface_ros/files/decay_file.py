@@ -26,9 +26,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limit_surface_ros.decay.delay_system import DelaySystem
+from limit_surface_ros.decay.delay.system import DelaySystem
 from limit_surface_ros.decay.exponential_sum import ExponentialSum
-from limit_surface_ros.decay.pieces import PiecewisePolynomial
+from limit_surface_ros.decay.delay.pieces import PiecewisePolynomial
 from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.yaml_reader import Section, place_errors, read_yaml, write_yaml
 

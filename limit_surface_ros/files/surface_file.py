@@ -4,7 +4,7 @@ Keys: `schema: 1`, `name`, `kind`, `frame_id`, `reference_point` [m], `character
 `friction_force` [N], `normal_force` [N] (optional), `fit` (how the model came about; free), and
 last the numbers that define the kind: `terms`, `exponents` and `matrices` of a power_sum, `terms`
 and `matrices` of a dissipation, `points` [m] and `friction_limits` [N] of point_contacts,
-`coefficients` of a polynomial in the order of `surface.polynomial.MONOMIALS`. Because
+`coefficients` of a polynomial in the order of `surface.kinds.polynomial.MONOMIALS`. Because
 these come last and are counted, a file cut short anywhere is refused.
 """
 
@@ -19,10 +19,10 @@ from limit_surface_ros.checks import as_positive
 from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.yaml_reader import Section, place_errors, read_yaml, write_yaml
 from limit_surface_ros.surface.convexity import Convexity, is_convex, warn_unless_convex
-from limit_surface_ros.surface.dissipation import Dissipation
-from limit_surface_ros.surface.point_contacts import PointContacts
-from limit_surface_ros.surface.polynomial import Polynomial
-from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+from limit_surface_ros.surface.kinds.polynomial import Polynomial
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 
 if TYPE_CHECKING:

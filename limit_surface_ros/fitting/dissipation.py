@@ -12,14 +12,14 @@ from limit_surface_ros.fitting.dissipation_direction_objective import (
     DissipationDirectionObjective,
 )
 from limit_surface_ros.fitting.dissipation_force_objective import DissipationForceObjective
-from limit_surface_ros.fitting.multi_start import Search
-from limit_surface_ros.fitting.scaled_pairs import check_support, scale_pairs
+from limit_surface_ros.fitting.search import Search
+from limit_surface_ros.fitting.pairs import check_support, scale_pairs
 from limit_surface_ros.fitting.solve import solve
 
 if TYPE_CHECKING:
     from limit_surface_ros.fitting.objective import Objective
     from limit_surface_ros.fitting.result import FitResult
-    from limit_surface_ros.fitting.scaled_pairs import ScaledPairs
+    from limit_surface_ros.fitting.pairs import ScaledPairs
     from limit_surface_ros.surface.pairs import Pairs
     from limit_surface_ros.surface.scaling import Scaling
 

@@ -16,11 +16,11 @@ from limit_surface_ros.fitting.dissipation_parameters import (
     random_factors,
 )
 from limit_surface_ros.fitting.motion_cost import MotionCost
-from limit_surface_ros.surface.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.fitting.scaled_pairs import ScaledPairs
+    from limit_surface_ros.fitting.pairs import ScaledPairs
 
 
 class DissipationDirectionObjective:

@@ -22,11 +22,11 @@ from limit_surface_ros.fitting.dissipation_parameters import (
     floored_matrices,
     random_factors,
 )
-from limit_surface_ros.surface.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Bools, Floats
-    from limit_surface_ros.fitting.scaled_pairs import ScaledPairs
+    from limit_surface_ros.fitting.pairs import ScaledPairs
 
 # Keeps a term finite where it does not move at all.
 _SLOWEST = 1e-9

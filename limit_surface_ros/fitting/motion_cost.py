@@ -21,7 +21,7 @@ from limit_surface_ros.fitting.smooth_inverse import SmoothInverse
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.fitting.scaled_pairs import ScaledPairs
+    from limit_surface_ros.fitting.pairs import ScaledPairs
 
 
 class MotionCost:

@@ -17,12 +17,12 @@ import numpy as np
 from limit_surface_ros.checks import as_floats
 from limit_surface_ros.errors import MissingExtraError, RangeError, SolverError
 from limit_surface_ros.fitting.result import FitResult, errors_on
-from limit_surface_ros.fitting.scaled_pairs import check_support, scale_pairs
-from limit_surface_ros.surface.polynomial import MONOMIALS, Polynomial
+from limit_surface_ros.fitting.pairs import check_support, scale_pairs
+from limit_surface_ros.surface.kinds.polynomial import MONOMIALS, Polynomial
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.fitting.scaled_pairs import ScaledPairs
+    from limit_surface_ros.fitting.pairs import ScaledPairs
     from limit_surface_ros.surface.pairs import Pairs
     from limit_surface_ros.surface.scaling import Scaling
 

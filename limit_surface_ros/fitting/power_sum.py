@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 from limit_surface_ros.checks import as_floats
 from limit_surface_ros.errors import RangeError, ShapeError
 from limit_surface_ros.fitting.cholesky import PARAMETERS_PER_MATRIX
-from limit_surface_ros.fitting.multi_start import Search
+from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
-from limit_surface_ros.fitting.scaled_pairs import check_support, scale_pairs
+from limit_surface_ros.fitting.pairs import check_support, scale_pairs
 from limit_surface_ros.fitting.solve import solve
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def fit_power_sum(
 
     Args:
         pairs: Loads on the surface and the motions they cause; one pair per parameter at least.
-        exponents: p_i in (0, 1], shape (m,): `surface.power_sum.thesis_exponents(m)`, or 1/2
+        exponents: p_i in (0, 1], shape (m,): `surface.kinds.power_sum.thesis_exponents(m)`, or 1/2
             for all m terms, a sum of norms.
         velocity_weight: w; 0 is J1 of the thesis and 1 its J2.
         scaling: Characteristic length and friction force; chosen from the pairs if not given.

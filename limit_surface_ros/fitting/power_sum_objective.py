@@ -28,11 +28,11 @@ from limit_surface_ros.fitting.cholesky import (
     two_exchanged,
 )
 from limit_surface_ros.fitting.direction_loss import direction_loss
-from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.fitting.scaled_pairs import ScaledPairs
+    from limit_surface_ros.fitting.pairs import ScaledPairs
 
 # Keeps powers and logarithms of a quadratic form finite where a matrix has lost the load's
 # direction; in scaled variables it is far below anything that a fit can see.

@@ -26,16 +26,16 @@ from limit_surface_ros.fitting.cholesky import (
     parameters_of,
 )
 from limit_surface_ros.fitting.direction_loss import direction_loss
-from limit_surface_ros.fitting.multi_start import Search, descend, descents
+from limit_surface_ros.fitting.search import Search, descend, descents
 from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
 from limit_surface_ros.fitting.result import FitResult, errors_on
-from limit_surface_ros.fitting.scaled_pairs import check_support, scale_pairs
+from limit_surface_ros.fitting.pairs import check_support, scale_pairs
 from limit_surface_ros.fitting.solve import is_sound
-from limit_surface_ros.surface.power_sum import PowerSum, thesis_exponents
+from limit_surface_ros.surface.kinds.power_sum import PowerSum, thesis_exponents
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.fitting.scaled_pairs import ScaledPairs
+    from limit_surface_ros.fitting.pairs import ScaledPairs
     from limit_surface_ros.surface.pairs import Pairs
     from limit_surface_ros.surface.scaling import Scaling
 

@@ -12,7 +12,7 @@ from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.sampling import facet_loads, random_motions
 
 if TYPE_CHECKING:
-    from limit_surface_ros.surface.point_contacts import PointContacts
+    from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 
 # Contacts of more points are taken for patches: their facets are too small to matter.
 _MOST_FACETED = 12

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.errors import SolverError
-from limit_surface_ros.fitting.multi_start import descents
+from limit_surface_ros.fitting.search import descents
 from limit_surface_ros.fitting.result import FitResult, errors_on
 
 if TYPE_CHECKING:
-    from limit_surface_ros.fitting.multi_start import Descent, Search
+    from limit_surface_ros.fitting.search import Descent, Search
     from limit_surface_ros.fitting.objective import Objective
     from limit_surface_ros.surface.pairs import Pairs
     from limit_surface_ros.surface.protocol import LimitSurface

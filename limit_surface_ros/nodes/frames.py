@@ -15,7 +15,7 @@ from limit_surface_ros.errors import FrameError, TransformTooNewError, Transform
 from limit_surface_ros.nodes.settings import Setting
 from limit_surface_ros.nodes.stamps import nanoseconds
 from limit_surface_ros.nodes.static_transforms import StaticTransforms
-from limit_surface_ros.surface.rigid_transform import RigidTransform
+from limit_surface_ros.surface.frames import RigidTransform
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -17,7 +17,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from limit_surface_ros.surface.mesh import mesh_of
-from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -10,7 +10,7 @@ from limit_surface_ros.errors import RangeError
 from limit_surface_ros.nodes import convert
 from limit_surface_ros.nodes.settings import Setting
 from limit_surface_ros.surface.planar import out_of_plane, planar
-from limit_surface_ros.surface.rigid_transform import RigidTransform
+from limit_surface_ros.surface.frames import RigidTransform
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.errors import FrameError, RangeError
-from limit_surface_ros.surface.rigid_transform import RigidTransform
+from limit_surface_ros.surface.frames import RigidTransform
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

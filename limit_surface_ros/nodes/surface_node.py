@@ -23,7 +23,7 @@ from limit_surface_ros.nodes.planar_inputs import PlanarInputs
 from limit_surface_ros.nodes.settings import Setting
 from limit_surface_ros.nodes.surface_markers import SurfaceMarkers
 from limit_surface_ros.surface.planar import power
-from limit_surface_ros.surface.pushing import push
+from limit_surface_ros.motion.push import push
 
 if TYPE_CHECKING:
     from std_msgs.msg import Header

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.surface.polynomial import Polynomial
-from limit_surface_ros.surface.power_gauge import PowerGauge
-from limit_surface_ros.surface.power_sum import PowerSum
-from limit_surface_ros.surface.quadratic_form import root_of
+from limit_surface_ros.surface.kinds.polynomial import Polynomial
+from limit_surface_ros.surface.gauges.power_sum import PowerGauge
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
+from limit_surface_ros.surface.linalg import root_of
 from limit_surface_ros.surface.sphere import even_directions
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.plane_minimum import Gauge
+    from limit_surface_ros.surface.support.newton import Gauge
     from limit_surface_ros.surface.protocol import LimitSurface
 
 # Directions of load that are looked at where no theorem decides.

@@ -11,7 +11,7 @@ from limit_surface_ros.surface.pairs import Pairs
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.point_contacts import PointContacts
+    from limit_surface_ros.surface.kinds.point_contacts import PointContacts
     from limit_surface_ros.surface.protocol import LimitSurface
 
 

@@ -25,7 +25,7 @@ from limit_surface_ros import __version__
 from limit_surface_ros.errors import FileError, LimitSurfaceError
 from limit_surface_ros.files.surface_file import read_surface_model, write_surface_model
 from limit_surface_ros.fitting.catalogue import Outcome, outcomes
-from limit_surface_ros.fitting.worker_processes import available_cores, worker_processes
+from limit_surface_ros.fitting.workers import available_cores, worker_processes
 from limit_surface_ros.surface.convexity import NotConvexWarning
 from limit_surface_ros.tools.executors import CLUSTER_IN_FLIGHT, check_address, dask_executor
 from limit_surface_ros.tools.fit_options import refuse_options_of_others

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from limit_surface_ros import __version__
-from limit_surface_ros.decay.coefficient_fits import NORMS
+from limit_surface_ros.decay.coefficients import NORMS
 from limit_surface_ros.decay.examples import EXAMPLES as RESPONSES
 from limit_surface_ros.decay.fit import METHODS, Options, fit_decay
 from limit_surface_ros.decay.response_fits import largest_error

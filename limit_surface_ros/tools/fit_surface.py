@@ -13,8 +13,8 @@ import numpy as np
 from limit_surface_ros.checks import counted
 from limit_surface_ros.files.surface_file import write_surface_model
 from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
-from limit_surface_ros.fitting.multi_start import AGREEMENT, process_pool
-from limit_surface_ros.fitting.worker_processes import available_cores
+from limit_surface_ros.fitting.search import AGREEMENT, process_pool
+from limit_surface_ros.fitting.workers import available_cores
 from limit_surface_ros.tools.fit_options import refuse_options_of_others
 from limit_surface_ros.tools.given_options import named_path, refuse_empty
 from limit_surface_ros.tools.output_file import check_output

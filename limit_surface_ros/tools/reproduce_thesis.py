@@ -8,20 +8,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from limit_surface_ros.errors import FileError, RangeError
-from limit_surface_ros.fitting.multi_start import process_pool
-from limit_surface_ros.fitting.worker_processes import available_cores
+from limit_surface_ros.fitting.search import process_pool
+from limit_surface_ros.fitting.workers import available_cores
 from limit_surface_ros.plots.canvas import new_figure
-from limit_surface_ros.plots.thesis.run import carry_out
-from limit_surface_ros.plots.thesis.settings import FULL, QUICK
-from limit_surface_ros.plots.thesis.store import Store
-from limit_surface_ros.plots.thesis.studies import STUDIES
+from limit_surface_ros.thesis.run import carry_out
+from limit_surface_ros.thesis.settings import FULL, QUICK
+from limit_surface_ros.thesis.store import Store
+from limit_surface_ros.thesis.studies import STUDIES
 from limit_surface_ros.tools.program import run_program
 from limit_surface_ros.tools.progress import progress_bar
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from limit_surface_ros.plots.thesis.findings import Study
+    from limit_surface_ros.thesis.findings import Study
 
 EPILOG = """\
 OUT/index.html shows every figure with what the text claims of it and what was measured; it needs

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from limit_surface_ros.decay import examples
-from limit_surface_ros.decay.closed_kernel import ClosedKernel
-from limit_surface_ros.decay.construction import delay_system, system_of_kernel
-from limit_surface_ros.decay.impulses import find_impulses
-from limit_surface_ros.decay.kernel import divide_series, memory_kernel
+from limit_surface_ros.decay.delay.closed_kernel import ClosedKernel
+from limit_surface_ros.decay.delay.construction import delay_system, system_of_kernel
+from limit_surface_ros.decay.delay.impulses import find_impulses
+from limit_surface_ros.decay.delay.kernel import divide_series, memory_kernel
 from limit_surface_ros.decay.smoothing import noise_level, smoothed
 from limit_surface_ros.decay.targets import Analytic, PiecewiseLinear, uniform_times
 from limit_surface_ros.errors import DataError, NotFiniteError, RangeError, ShapeError

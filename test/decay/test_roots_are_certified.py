@@ -9,16 +9,16 @@ from hypothesis import strategies as st
 from scipy.special import lambertw
 
 from limit_surface_ros.decay import examples, roots
-from limit_surface_ros.decay.construction import delay_system
-from limit_surface_ros.decay.delay_system import DelaySystem
-from limit_surface_ros.decay.pieces import PiecewisePolynomial
-from limit_surface_ros.decay.roots import (
+from limit_surface_ros.decay.delay.construction import delay_system
+from limit_surface_ros.decay.delay.system import DelaySystem
+from limit_surface_ros.decay.delay.pieces import PiecewisePolynomial
+from limit_surface_ros.decay.delay.roots import (
     count_roots,
     first_roots,
     rightmost_roots,
     roots_in_box,
 )
-from limit_surface_ros.decay.stability import (
+from limit_surface_ros.decay.delay.stability import (
     count_growing_modes,
     count_unstable_roots,
     require_minimum_phase,

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
-from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 PROGRAMS = [EXAMPLES / "python_client.py", EXAMPLES / "cpp_client" / "cpp_client.cpp"]

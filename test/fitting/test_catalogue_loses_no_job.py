@@ -10,7 +10,7 @@ import pytest
 
 from limit_surface_ros.errors import ClusterError, RangeError
 from limit_surface_ros.fitting.catalogue import outcomes
-from limit_surface_ros.fitting.worker_processes import available_cores, worker_processes
+from limit_surface_ros.fitting.workers import available_cores, worker_processes
 
 # An error that does not survive the way between processes.
 MISSING = "from limit_surface_ros.errors import *; raise MissingExtraError(\\'sage\\', \\'none\\')"

@@ -12,13 +12,13 @@ from limit_surface_ros.fitting.dissipation_direction_objective import (
     DissipationDirectionObjective,
 )
 from limit_surface_ros.fitting.dissipation_force_objective import DissipationForceObjective
-from limit_surface_ros.fitting.multi_start import Search
-from limit_surface_ros.fitting.scaled_pairs import scale_pairs
+from limit_surface_ros.fitting.search import Search
+from limit_surface_ros.fitting.pairs import scale_pairs
 from limit_surface_ros.fitting.smooth_inverse import SmoothInverse
-from limit_surface_ros.surface.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.measures import load_error, velocity_error
 from limit_surface_ros.surface.pairs import Pairs
-from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.sampling import facet_loads, random_loads, random_motions
 from limit_surface_ros.surface.scaling import Scaling
 

@@ -5,18 +5,18 @@ import pytest
 
 from limit_surface_ros.errors import DataError, RangeError
 from limit_surface_ros.fitting.cholesky import factors_of_matrices, parameters_of
-from limit_surface_ros.fitting.multi_start import Search
+from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.polynomial import fit_polynomial
 from limit_surface_ros.fitting.power_sum import fit_power_sum
 from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
-from limit_surface_ros.fitting.scaled_pairs import scale_pairs
+from limit_surface_ros.fitting.pairs import scale_pairs
 from limit_surface_ros.fitting.second_approximation import (
     SecondObjective,
     fit_second_approximation,
 )
 from limit_surface_ros.fitting.simulation import simulated_pairs
-from limit_surface_ros.surface.point_contacts import PointContacts
-from limit_surface_ros.surface.power_sum import PowerSum, thesis_exponents
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+from limit_surface_ros.surface.kinds.power_sum import PowerSum, thesis_exponents
 from limit_surface_ros.surface.sampling import random_loads, random_motions
 from limit_surface_ros.surface.scaling import Scaling
 

@@ -6,15 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from limit_surface_ros.errors import DataError, RangeError
-from limit_surface_ros.fitting.multi_start import Search, descents, process_pool
+from limit_surface_ros.fitting.search import Search, descents, process_pool
 from limit_surface_ros.fitting.power_sum import fit_power_sum
 from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
-from limit_surface_ros.fitting.scaled_pairs import ScaledPairs, scale_pairs
+from limit_surface_ros.fitting.pairs import ScaledPairs, scale_pairs
 from limit_surface_ros.fitting.simulation import simulated_pairs
 from limit_surface_ros.surface.measures import quantiles, velocity_error
 from limit_surface_ros.surface.pairs import Pairs
-from limit_surface_ros.surface.point_contacts import PointContacts
-from limit_surface_ros.surface.power_sum import PowerSum, thesis_exponents
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+from limit_surface_ros.surface.kinds.power_sum import PowerSum, thesis_exponents
 from limit_surface_ros.surface.sampling import facet_loads, random_loads, random_motions
 from limit_surface_ros.surface.scaling import Scaling
 

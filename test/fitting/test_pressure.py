@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from limit_surface_ros.fitting.pressure import PressureObjective, fit_pressure
-from limit_surface_ros.fitting.scaled_pairs import ScaledPairs, scale_pairs
-from limit_surface_ros.fitting.small_contacts import SmallContacts
-from limit_surface_ros.surface.dissipation import Dissipation
+from limit_surface_ros.fitting.few_pushes.pressure import PressureObjective, fit_pressure
+from limit_surface_ros.fitting.pairs import ScaledPairs, scale_pairs
+from limit_surface_ros.fitting.few_pushes.small_contacts import SmallContacts
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.measures import mean_angle
 from limit_surface_ros.surface.pairs import Pairs
-from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.sampling import random_loads
 from limit_surface_ros.surface.scaling import Scaling
 

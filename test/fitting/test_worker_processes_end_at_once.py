@@ -10,7 +10,7 @@ from process_helpers import started_python
 
 PROGRAM = """
 import sys, time
-from limit_surface_ros.fitting.worker_processes import worker_processes
+from limit_surface_ros.fitting.workers import worker_processes
 
 def work(data):
     time.sleep(60)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
-from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 
 WAIT = 20.0

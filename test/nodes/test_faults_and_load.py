@@ -30,7 +30,7 @@ from rclpy.serialization import serialize_message
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
 from limit_surface_ros.nodes import convert
 from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
-from limit_surface_ros.surface.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.scaling import Scaling
 from node_helpers import Program, planar_twist, wrench_message
 

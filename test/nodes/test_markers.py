@@ -15,8 +15,8 @@ from visualization_msgs.msg import Marker
 from limit_surface_ros.files.surface_file import SurfaceModel
 from limit_surface_ros.nodes import markers
 from limit_surface_ros.nodes.markers import Canvas
-from limit_surface_ros.surface.point_contacts import PointContacts
-from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 
 SURFACE = PowerSum.norms([np.diag([1.0, 2.0, 0.5])], Scaling(0.05, 4.0))

@@ -23,9 +23,9 @@ from limit_surface_ros.files.surface_file import (
 )
 from limit_surface_ros.nodes.model_host import ModelHost
 from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
-from limit_surface_ros.surface.point_contacts import PointContacts
-from limit_surface_ros.surface.polynomial import Polynomial
-from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+from limit_surface_ros.surface.kinds.polynomial import Polynomial
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 from node_helpers import planar_twist, wrench_message
 

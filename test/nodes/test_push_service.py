@@ -15,7 +15,7 @@ from limit_surface_interfaces.msg import ErrorCode
 from limit_surface_interfaces.srv import Push
 
 from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
-from limit_surface_ros.surface.pushing import ContactMode, push
+from limit_surface_ros.motion.push import ContactMode, push
 from node_helpers import STAMP, planar_twist, planar_wrench
 
 YAW = 0.5

@@ -16,10 +16,10 @@ from limit_surface_interfaces.srv import WrenchToTwist
 
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
-from limit_surface_ros.fitting.multi_start import Search
+from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.power_sum import fit_power_sum
-from limit_surface_ros.fitting.scaled_pairs import scaling_of_pairs
-from limit_surface_ros.surface.power_sum import thesis_exponents
+from limit_surface_ros.fitting.pairs import scaling_of_pairs
+from limit_surface_ros.surface.kinds.power_sum import thesis_exponents
 from node_helpers import Program, planar_twist, wrench_message
 
 SHARED = Path(os.environ.get("LIMIT_SURFACE_SHARED", Path(__file__).parents[3] / "shared"))

@@ -12,7 +12,7 @@ from limit_surface_ros.plots.surface_view import (
     section_curve,
     surface_grid,
 )
-from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.sampling import random_loads
 from limit_surface_ros.surface.scaling import Scaling
 

@@ -7,7 +7,7 @@ import pytest
 
 from limit_surface_ros.errors import GeometryError, RangeError, ShapeError
 from limit_surface_ros.surface import pressure, sampling, shapes
-from limit_surface_ros.surface.contact_patch import ContactPatch, natural_scaling
+from limit_surface_ros.surface.contact.patch import ContactPatch, natural_scaling
 
 L_SHAPE = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]
 

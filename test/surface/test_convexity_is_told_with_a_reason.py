@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from limit_surface_ros.surface.convexity import NotConvexWarning, is_convex, warn_unless_convex
-from limit_surface_ros.surface.dissipation import Dissipation
-from limit_surface_ros.surface.point_contacts import PointContacts
-from limit_surface_ros.surface.polynomial import Polynomial
-from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+from limit_surface_ros.surface.kinds.polynomial import Polynomial
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 
 SPHERE = [1, 0, 0, 2, 0, 2, 0, 0, 0, 0, 1, 0, 2, 0, 1]

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from limit_surface_ros.surface import measures, sampling
-from limit_surface_ros.surface.dissipation import Dissipation
-from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.scaling import Scaling
 
 seeds = st.integers(0, 2**32 - 1)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from limit_surface_ros.surface.point_contacts import PointContacts
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.scaling import Scaling
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from limit_surface_ros.errors import RangeError
 from limit_surface_ros.surface.mesh import mesh_of
-from limit_surface_ros.surface.point_contacts import PointContacts
-from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 
 BALL = PowerSum.norms([np.eye(3)], Scaling(0.1, 4.0))

@@ -7,10 +7,10 @@ import pytest
 
 from limit_surface_ros.errors import NotFiniteError, ShapeError, ZeroVectorError
 from limit_surface_ros.surface import sampling
-from limit_surface_ros.surface.dissipation import Dissipation
-from limit_surface_ros.surface.point_contacts import PointContacts
-from limit_surface_ros.surface.polynomial import Polynomial
-from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+from limit_surface_ros.surface.kinds.polynomial import Polynomial
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 
 RNG = np.random.default_rng(11)

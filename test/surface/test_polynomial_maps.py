@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from limit_surface_ros.errors import MatrixError, ShapeError
 from limit_surface_ros.surface import measures, sampling
-from limit_surface_ros.surface.polynomial import MONOMIALS, Polynomial
-from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.kinds.polynomial import MONOMIALS, Polynomial
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 
 seeds = st.integers(0, 2**32 - 1)

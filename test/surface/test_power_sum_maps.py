@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from limit_surface_ros.errors import MatrixError, NotFiniteError, RangeError, ShapeError
 from limit_surface_ros.surface import measures, sampling
-from limit_surface_ros.surface.power_sum import PowerSum, thesis_exponents
+from limit_surface_ros.surface.kinds.power_sum import PowerSum, thesis_exponents
 from limit_surface_ros.surface.protocol import LimitSurface
 from limit_surface_ros.surface.scaling import Scaling
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from limit_surface_ros.surface.power_sum_scale import (
+from limit_surface_ros.surface.gauges.power_scale import (
     LogarithmicScale,
     PolynomialScale,
     power_scale,

@@ -6,8 +6,8 @@ import pytest
 from limit_surface_ros.errors import DataError, RangeError
 from limit_surface_ros.surface import measures, sampling
 from limit_surface_ros.surface.pairs import Pairs
-from limit_surface_ros.surface.point_contacts import PointContacts
-from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 
 TRIANGLE = np.array([[-40, -40], [-40, 80], [80, -40]]) / 150

@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from limit_surface_ros.surface import sampling
-from limit_surface_ros.surface.dissipation import Dissipation
-from limit_surface_ros.surface.point_contacts import PointContacts
-from limit_surface_ros.surface.polynomial import Polynomial
-from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+from limit_surface_ros.surface.kinds.polynomial import Polynomial
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
-from limit_surface_ros.surface.support_table import SupportTable
-from limit_surface_ros.surface.tabulated_inverse import TabulatedInverse
+from limit_surface_ros.surface.support.table import SupportTable
+from limit_surface_ros.surface.support.tabulated import TabulatedInverse
 
 # More than it takes for a table.
 MANY = 30_000

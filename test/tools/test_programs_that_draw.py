@@ -6,7 +6,7 @@ import pytest
 from limit_surface_ros.files.decay_file import read_decay_model
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
 from limit_surface_ros.plots.decay_view import draw_decay
-from limit_surface_ros.surface.power_sum import PowerSum
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.tools import fit_decay, plot_decay, plot_surface, reproduce_thesis
 
 pytest.importorskip("matplotlib", reason="matplotlib draws the pictures")

@@ -1,0 +1,1 @@
+"""Fits to few, noisy pushes: recipes, their choice, and what the data leave open."""

@@ -1,0 +1,141 @@
+"""Small contacts: the support points that a fit chooses from, and the few it is summed up in.
+
+A contact at (x, y) of friction limit m and radius c makes the term m sqrt(wx^2 + wy^2 + (c w)^2),
+with (wx, wy) = (vx - y w, vy + x w) its velocity: three speeds instead of the two of a point, so
+that the load of a motion is smooth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.fitting.pairs import ScaledPairs
+    from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+
+# Rings of the disc of candidates, and its radius in lever arms of the loads: beyond where a body
+# stands for all but the oddest pushes, with some dozen contacts inside of one lever arm.
+_RINGS = 6
+_REACH = 4.0
+# Radius of a contact of the disc, in parts of the distance between rings.
+_OVERLAP = 0.5
+# Radius of a contact at a known support point, in parts of how far the points spread.
+_KNOWN_SIZE = 0.1
+# Smallest radius, in characteristic lengths: keeps a single point's resistance to turning.
+_SMALLEST = 1e-3
+# Share of the largest friction limit below which a contact is left out.
+_NEGLIGIBLE = 1e-3
+
+
+@dataclass(frozen=True)
+class SmallContacts:
+    """Contacts in scaled variables.
+
+    Attributes:
+        points: Shape (k, 2), in characteristic lengths.
+        limits: Friction limits, not negative, shape (k,), in parts of the friction force scale.
+        radii: Shape (k,), in characteristic lengths.
+    """
+
+    points: Floats
+    limits: Floats
+    radii: Floats
+
+    @classmethod
+    def on_a_disc(cls, pairs: ScaledPairs) -> SmallContacts:
+        """Return equal contacts that cover wherever the body of these pushes may stand.
+
+        The loads' line of action passes the centre of friction at their lever arm; so centre and
+        radius follow from the loads alone, wherever the reference point is and in any unit.
+        """
+        forces, moments, weights = pairs.wrenches[:, :2], pairs.wrenches[:, 2], pairs.weights
+        arms = np.stack([forces[:, 1], -forces[:, 0]], axis=1)
+        roots = np.sqrt(weights)
+        centre = np.linalg.lstsq(arms * roots[:, None], moments * roots, rcond=None)[0]
+        lever = np.sqrt((weights @ (moments - arms @ centre) ** 2) / (weights @ (arms**2)).sum())
+        radius = max(_REACH * float(lever), _RINGS * _SMALLEST)
+        points = centre + radius * _rings()
+        spacing = radius / _RINGS
+        count = len(points)
+        even = cls(points, np.ones(count), np.full(count, _OVERLAP * spacing))
+        return even.with_loads_of(pairs)
+
+    @classmethod
+    def at(cls, support: PointContacts, pairs: ScaledPairs) -> SmallContacts:
+        """Return contacts at known support points; only the ratios of their limits count."""
+        pressing = support.friction_limits > 0.0
+        points = support.points[pressing] / pairs.scaling.characteristic_length
+        away = points - points.mean(axis=0)
+        radius = max(_KNOWN_SIZE * float(np.sqrt(np.mean(np.sum(away**2, axis=1)))), _SMALLEST)
+        limits = support.friction_limits[pressing] / support.friction_limits.sum()
+        return cls(points, limits, np.full(len(points), radius)).with_loads_of(pairs)
+
+    @property
+    def speeds(self) -> Floats:
+        """C_k with a contact's speed sqrt(v' C_k v), shape (k, 3, 3)."""
+        x, y = self.points.T
+        zeros, ones = np.zeros_like(x), np.ones_like(x)
+        turning = x * x + y * y + self.radii**2
+        forms = np.array([[ones, zeros, -y], [zeros, ones, x], [-y, x, turning]])
+        return np.asarray(np.moveaxis(forms, -1, 0))
+
+    @property
+    def matrices(self) -> Floats:
+        """B_k = m_k^2 C_k of the dissipation model that the contacts make, shape (k, 3, 3)."""
+        return np.asarray(self.speeds * (self.limits**2)[:, None, None])
+
+    def with_loads_of(self, pairs: ScaledPairs) -> SmallContacts:
+        """Return them with limits so large that loads of the pairs' motions have their size."""
+        products = np.einsum("kij,nj->kni", self.speeds, pairs.directions)
+        speeds = np.sqrt(np.einsum("kni,ni->kn", products, pairs.directions))
+        loads = np.einsum("k,kni->ni", self.limits, products / speeds[:, :, None])
+        size = np.median(np.linalg.norm(pairs.wrenches, axis=1))
+        ratio = float(size / np.median(np.linalg.norm(loads, axis=1)))
+        return SmallContacts(self.points, ratio * self.limits, self.radii)
+
+    def that_carry(self) -> SmallContacts:
+        """Return those whose friction counts."""
+        carry = self.limits > _NEGLIGIBLE * self.limits.max()
+        return SmallContacts(self.points[carry], self.limits[carry], self.radii[carry])
+
+    def merged(self, count: int) -> SmallContacts:
+        """Return at most `count` contacts that stand for them all.
+
+        Two contacts become one at their centre of friction, with the moment of both, so that
+        total, centre and spread of the friction stay. Those go first that widen the least (Ward
+        1963, doi:10.1080/01621459.1963.10500845).
+        """
+        points, limits, radii = self.points.copy(), self.limits.copy(), self.radii.copy()
+        kept = np.ones(len(limits), dtype=bool)
+        away = points[:, None] - points
+        shared = np.multiply.outer(limits, limits) / np.add.outer(limits, limits)
+        widening = shared * np.einsum("ijc,ijc->ij", away, away)
+        np.fill_diagonal(widening, np.inf)
+        for _ in range(len(limits) - max(count, 1)):
+            first, second = divmod(int(widening.argmin()), len(limits))
+            both = [first, second]
+            total = limits[both].sum()
+            moment = limits[both] @ radii[both] ** 2 + widening[first, second]
+            points[first] = limits[both] @ points[both] / total
+            limits[first], radii[first] = total, np.sqrt(moment / total)
+            kept[second] = False
+            # Only what is about these two changes: a patch has a thousand contacts.
+            away = points[first] - points
+            row = limits[first] * limits / (limits[first] + limits) * np.sum(away**2, axis=1)
+            row[~kept] = row[first] = np.inf
+            widening[first], widening[:, first] = row, row
+            widening[second], widening[:, second] = np.inf, np.inf
+        return SmallContacts(points[kept], limits[kept], radii[kept])
+
+
+def _rings() -> Floats:
+    """Return a centre and rings of 6, 12, 18 ... points around it in the unit disc."""
+    points = [np.zeros((1, 2))]
+    for ring in range(1, _RINGS + 1):
+        angles = 2.0 * np.pi * (np.arange(6 * ring) + 0.5 * (ring % 2)) / (6 * ring)
+        points.append(ring / _RINGS * np.stack([np.cos(angles), np.sin(angles)], axis=1))
+    return np.concatenate(points)

@@ -1,0 +1,143 @@
+"""How far recorded pushes leave a predicted twist open: refits with random weights of the pushes.
+
+The Bayesian bootstrap (Rubin 1981, doi:10.1214/aos/1176345338) draws each push's weight from an
+exponential distribution. The surfaces of many such refits spread as the data allow.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from limit_surface_ros.checks import as_floats
+from limit_surface_ros.errors import DataError, RangeError, SolverError
+from limit_surface_ros.fitting.few_pushes.recipe import Workbench
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from concurrent.futures import Executor
+
+    from numpy.typing import ArrayLike
+
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.fitting.search import Progress
+    from limit_surface_ros.fitting.few_pushes.recipe import Recipe
+    from limit_surface_ros.surface.pairs import Pairs
+    from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+    from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.surface.scaling import Scaling
+
+
+def bootstrap(
+    pairs: Pairs,
+    recipe: Recipe,
+    count: int,
+    *,
+    scaling: Scaling | None = None,
+    support: PointContacts | None = None,
+    seed: int = 0,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> tuple[LimitSurface, ...]:
+    """Return the surfaces of `count` refits by one recipe.
+
+    Args:
+        pairs: Recorded pushes.
+        recipe: How to fit.
+        count: How many refits, at least 2.
+        scaling: Characteristic length and friction force; chosen from the pairs if not given.
+        support: Known support points, for recipes held towards them.
+        seed: Of weights and random starts.
+        executor: Where refits run; here and one by one if not given.
+        progress: Called with (refits done, refits in all) after each.
+
+    Raises:
+        RangeError: `count` is below 2.
+        DataError: The pushes cannot determine a surface.
+        SolverError: Fewer than two refits pass through the loads.
+    """
+    if count < 2:
+        raise RangeError(f"a bootstrap needs at least 2 refits, got {count}")
+    weights = np.random.default_rng([seed, count]).exponential(size=(count, len(pairs)))
+    weights /= weights.mean(axis=1, keepdims=True)
+    tasks = [(Workbench(pairs, scaling, support, each, seed), recipe) for each in weights]
+    if executor is None:
+        found = (_refit(*task) for task in tasks)
+    else:
+        futures = [executor.submit(_refit, *task) for task in tasks]
+        found = (future.result() for future in futures)
+    surfaces: tuple[LimitSurface, ...] = ()
+    for done, surface in enumerate(found, start=1):
+        if surface is not None:
+            surfaces += (surface,)
+        if progress is not None:
+            progress(done, count)
+    if len(surfaces) < 2:
+        raise SolverError(f"no refits by {recipe} pass through the loads")
+    return surfaces
+
+
+def _refit(bench: Workbench, recipe: Recipe) -> LimitSurface | None:
+    try:
+        return bench.fit(recipe)[0]
+    except SolverError:
+        # Weights under which the fit is lost: the others show the spread.
+        return None
+
+
+def twist_spread(surfaces: Sequence[LimitSurface], wrench: ArrayLike) -> Floats:
+    """Return how far the surfaces' twists lie from their mean, root mean square [rad].
+
+    Args:
+        surfaces: At least 2, of one scaling.
+        wrench: Shape (..., 3), (fx, fy, tau_z) in [N, N, N m].
+
+    Returns:
+        Shape (...), angles in scaled variables.
+
+    Raises:
+        DataError: There are fewer than 2 surfaces.
+    """
+    if len(surfaces) < 2:
+        raise DataError(f"a spread needs at least 2 surfaces, got {len(surfaces)}")
+    unit = surfaces[0].scaling.twist_unit
+    twists = np.array([surface.twist_of_wrench(wrench) for surface in surfaces]) / unit
+    mean = twists.mean(axis=0)
+    mean /= np.linalg.norm(mean, axis=-1, keepdims=True)
+    angles = 2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(twists - mean, axis=-1), 1.0))
+    return np.asarray(np.sqrt(np.mean(angles**2, axis=0)))
+
+
+def stored_surfaces(surfaces: Sequence[LimitSurface]) -> dict[str, Any]:
+    """Return the surfaces of a bootstrap as plain values for a model file."""
+    first = surfaces[0]
+    values: dict[str, Any] = {"kind": first.kind, "matrices": []}
+    if isinstance(first, PowerSum):
+        values["exponents"] = first.exponents.tolist()
+    for surface in surfaces:
+        assert isinstance(surface, (PowerSum, Dissipation))
+        values["matrices"].append(surface.matrices.tolist())
+    return values
+
+
+def surfaces_of(stored: Mapping[str, Any], scaling: Scaling) -> tuple[LimitSurface, ...]:
+    """Return the surfaces that `stored_surfaces` put into a model file's `fit: bootstrap`.
+
+    Args:
+        stored: What stands there.
+        scaling: The model's.
+
+    Raises:
+        DataError: It is not what `stored_surfaces` makes.
+    """
+    try:
+        # Refits need not have the same number of terms.
+        matrices = [as_floats("matrices", each) for each in stored["matrices"]]
+        if stored["kind"] == PowerSum.kind:
+            return tuple(PowerSum(each, stored["exponents"], scaling) for each in matrices)
+        return tuple(Dissipation(each, scaling) for each in matrices)
+    except (KeyError, TypeError, ValueError) as error:
+        raise DataError(f"fit: bootstrap holds no surfaces: {error}") from None

@@ -1,0 +1,1 @@
+"""Contacts: shapes, pressures and patches."""

@@ -1,0 +1,232 @@
+"""The dissipation D(v) of a sliding body as a sum of norms, with its derivatives and facets.
+
+Both the sums of quadratic-form norms and support points speak this one language to
+`gauge_inverse`. All arrays are scaled columns.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from limit_surface_ros.surface.gauges.corners import Corners
+from limit_surface_ros.surface.support.newton import Gauge
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from limit_surface_ros.checks import Floats
+
+# A term whose norm is smaller than this, relative to what it could be, is at its kink.
+KINK = 1e-14
+# Elements of one array of points by motions, of which several stay in the processor's cache.
+_ELEMENTS = 2**14
+
+
+class DissipationTerms(Gauge, Protocol):
+    """A sum of norms D(v) = sum_k |R_k v|, each smoothed to sqrt(|R_k v|^2 + (e size)^2)."""
+
+    def gradient(self, twists: Floats) -> Floats:
+        """Return the gradient (3, m) of D; a term at its kink adds nothing."""
+        ...
+
+    def values_and_normals(self, twists: Floats) -> tuple[Floats, Floats]:
+        """Return D (m,) and its gradient (3, m), as `gradient` does."""
+        ...
+
+    def corners(self) -> Corners | None:
+        """Return the motions at which one term is at rest: facets of the set of loads."""
+        ...
+
+
+class FormTerms:
+    """D(v) = sum_k sqrt(v' B_k v) with B_k = R_k' R_k."""
+
+    def __init__(self, roots: Floats) -> None:
+        """Keep the factors R_k, shape (k, 3, 3)."""
+        self._roots = roots
+        self._forms = np.swapaxes(roots, 1, 2) @ roots
+        self._sizes = np.sqrt(np.trace(self._forms, axis1=1, axis2=2))
+        self._stacked_roots = roots.reshape(-1, 3)
+        self._least = KINK * self._sizes
+        self._most = float(self._least.max())
+
+    def gradient(self, twists: Floats) -> Floats:
+        """Return the gradient (3, m) of D; a term at its kink adds nothing.
+
+        In the precision of the twists.
+        """
+        return self.values_and_normals(twists)[1]
+
+    def values_and_normals(self, twists: Floats) -> tuple[Floats, Floats]:
+        """Return D (m,) and its gradient (3, m), as `gradient` does."""
+        roots = self._stacked_roots.astype(twists.dtype, copy=False)
+        images = roots.dot(twists).reshape(-1, 3, twists.shape[1])
+        norms = np.sqrt(np.einsum("kcm,kcm->km", images, images))
+        values = np.add.reduce(norms)
+        # The least of all norms is cheaper than one bound for each, and is most often enough.
+        if norms.min() <= self._most * np.abs(twists).max():
+            length = np.abs(twists).max(axis=0)
+            norms[norms <= self._least[:, np.newaxis] * length] = np.inf
+        images /= norms[:, np.newaxis]
+        return values, np.asarray(roots.T.dot(images.reshape(-1, twists.shape[1])))
+
+    def values(self, twists: Floats) -> Floats:
+        """Return D (m,)."""
+        total: Floats = np.zeros(twists.shape[1])
+        for root in self._roots:
+            image = root @ twists
+            total += np.sqrt((image * image).sum(axis=0))
+        return total
+
+    def derivatives(self, twists: Floats, smoothing: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return D, its gradient and Hessian; see `Gauge`."""
+        total: Floats = np.zeros(twists.shape[1])
+        gradient: Floats = np.zeros_like(twists)
+        hessian: Floats = np.zeros((3, 3, twists.shape[1]))
+        for root, form, size in zip(self._roots, self._forms, self._sizes, strict=True):
+            image = root @ twists
+            norm = np.sqrt((image * image).sum(axis=0) + (size * smoothing) ** 2)
+            total += norm
+            norm[norm <= KINK * size * np.sqrt((twists * twists).sum(axis=0))] = np.inf
+            pull = root.T @ (image / norm)
+            gradient += pull
+            hessian += (form[:, :, np.newaxis] - pull[:, np.newaxis] * pull) / norm
+        return total, gradient, hessian
+
+    def corners(self) -> Corners | None:
+        """Return those of each term of rank two whose motion at rest is no other term's."""
+        flat = np.abs(self._roots).any(axis=2).sum(axis=1) == 2
+        roots = self._roots[flat][:, :2]
+        kinks = np.cross(roots[:, 0], roots[:, 1])
+        kinks /= np.linalg.norm(kinks, axis=1, keepdims=True)
+        moving = np.linalg.norm(self._roots @ kinks.T, axis=1) > 1e-9 * self._sizes[:, np.newaxis]
+        alone = moving.sum(axis=0) == len(self._roots) - 1
+        kinks, roots = kinks[alone], roots[alone]
+        _, gradients, hessians = self.derivatives(kinks.T, np.zeros(len(kinks)))
+        return Corners.of_norms(kinks, roots, gradients, hessians)
+
+
+class PointTerms:
+    """D(v) = sum_k m_k |w_k|, w_k the velocity of support point k."""
+
+    def __init__(self, points: Floats, limits: Floats) -> None:
+        """Keep scaled points (n, 2) and limits (n,), coincident points as one."""
+        points, place = np.unique(points[limits > 0.0], axis=0, return_inverse=True)
+        limits = np.bincount(place.ravel(), weights=limits[limits > 0.0]).astype(np.float64)
+        x, y = points.T
+        ones = np.ones_like(x)
+        self.points = points
+        self.limits = limits
+        self._x, self._y = x[:, np.newaxis], y[:, np.newaxis]
+        self._reach = max(1.0, float(np.hypot(x, y).max()))
+        zeros = np.zeros_like(x)
+        # Velocities of the points, (2, n, 3) @ twist, and the load of unit forces at them.
+        self._jacobians = np.array([[ones, zeros, -y], [zeros, ones, x]]).transpose(0, 2, 1).copy()
+        self._pulls = limits * np.array([[ones, zeros], [zeros, ones], [-y, x]])
+        self._along_moments = limits * np.array([ones, y, y * y])
+        self._beside_moments = limits * np.array([ones, x, x * x])
+        self._cross_moments = limits * np.array([ones, x, y, x * y])
+
+    def gradient(self, twists: Floats) -> Floats:
+        """Return the gradient (3, m) of D; a point at rest adds nothing."""
+        loads = (self._loads(part, twists) for part in self._parts(twists.shape[1]))
+        total = next(loads)
+        for each in loads:
+            total += each
+        return total
+
+    def _loads(self, part: slice, twists: Floats) -> Floats:
+        """Return what some of the points add to the gradient."""
+        columns = twists.shape[1]
+        velocities = self._jacobians[:, part].reshape(-1, 3) @ twists
+        velocities = velocities.reshape(2, -1, columns)
+        velocities /= self._speeds(velocities[0], velocities[1], twists)
+        pulls = self._pulls[:, :, part].reshape(3, -1)
+        return np.asarray(pulls @ velocities.reshape(-1, columns))
+
+    def values_and_normals(self, twists: Floats) -> tuple[Floats, Floats]:
+        """Return D (m,) and its gradient (3, m), as `gradient` does."""
+        gradient = self.gradient(twists)
+        return np.einsum("im,im->m", gradient, twists), gradient
+
+    def values(self, twists: Floats) -> Floats:
+        """Return D (m,)."""
+        total: Floats = np.zeros(twists.shape[1])
+        for part in self._parts(twists.shape[1]):
+            wx, wy = self._velocities(twists, part)
+            wx *= wx
+            wy *= wy
+            wx += wy
+            total += self.limits[part] @ np.sqrt(wx, out=wx)
+        return total
+
+    def derivatives(self, twists: Floats, smoothing: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return D, its gradient and Hessian; see `Gauge`."""
+        softness = np.square(self._reach * smoothing) if smoothing.any() else None
+        total: Floats = np.zeros(twists.shape[1])
+        gradient: Floats = np.zeros_like(twists)
+        hessian: Floats = np.zeros((3, 3, twists.shape[1]))
+        for part in self._parts(twists.shape[1]):
+            ex, ey = self._velocities(twists, part)
+            speed = self._speeds(ex, ey, twists, softness)
+            total += self.limits[part] @ np.where(speed < np.inf, speed, 0.0)
+            slowness = np.divide(1.0, speed, out=speed)
+            ex *= slowness
+            ey *= slowness
+            gradient += self._pulls[:, 0, part] @ ex
+            gradient += self._pulls[:, 1, part] @ ey
+            # A speed's Hessian is [ey^2, -ex ey; -ex ey, ex^2] / speed if nothing is smoothed.
+            bent = slowness * ex
+            across = self._cross_moments[:, part] @ (bent * ey)
+            bent *= ex
+            in_y = self._beside_moments[:, part] @ bent
+            np.multiply(slowness, ey, out=bent)
+            bent *= ey
+            in_x = self._along_moments[:, part] @ bent
+            if softness is not None:
+                rounding = slowness**3 * softness
+                in_x += self._along_moments[:, part] @ rounding
+                in_y += self._beside_moments[:, part] @ rounding
+            hessian[0, 0] += in_x[0]
+            hessian[0, 1] -= across[0]
+            hessian[1, 1] += in_y[0]
+            hessian[0, 2] -= in_x[1] + across[1]
+            hessian[1, 2] += in_y[1] + across[2]
+            hessian[2, 2] += in_x[2] + 2.0 * across[3] + in_y[2]
+        hessian[1, 0], hessian[2, 0], hessian[2, 1] = hessian[0, 1], hessian[0, 2], hessian[1, 2]
+        return total, gradient, hessian
+
+    def corners(self) -> Corners | None:
+        """Return the rotations about each support point."""
+        x, y = self.points.T
+        kinks = np.array([y, -x, np.ones_like(x)]).T
+        _, gradients, hessians = self.derivatives(kinks.T, np.zeros(len(kinks)))
+        roots = self.limits[:, np.newaxis, np.newaxis] * self._jacobians.swapaxes(0, 1)
+        return Corners.of_norms(kinks, roots, gradients, hessians)
+
+    def _parts(self, columns: int) -> Iterator[slice]:
+        """Yield slices of points, so short that arrays of them by motions stay in the cache."""
+        count = max(1, _ELEMENTS // max(columns, 1))
+        for start in range(0, len(self.limits), count):
+            yield slice(start, start + count)
+
+    def _velocities(self, twists: Floats, part: slice) -> tuple[Floats, Floats]:
+        vx, vy, omega = twists
+        return vx - omega * self._y[part], vy + omega * self._x[part]
+
+    def _speeds(
+        self, wx: Floats, wy: Floats, twists: Floats, softness: Floats | None = None
+    ) -> Floats:
+        """Return speeds, infinite for points at rest so that they add nothing."""
+        speed = wx * wx
+        speed += wy * wy
+        if softness is not None:
+            speed += softness
+        size = np.abs(twists)
+        least = KINK * self._reach
+        # The least of all speeds is cheaper than one bound for each, and is most often enough.
+        if speed.min(initial=np.inf) <= (least * size.max(initial=0.0)) ** 2:
+            speed[speed <= np.square(least * size.max(axis=0))] = np.inf
+        return np.sqrt(speed, out=speed)

@@ -1,0 +1,142 @@
+"""The load factor of a sum of powers as a gauge, with its derivatives."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from limit_surface_ros.surface.gauges.corners import Corners
+from limit_surface_ros.surface.gauges.power_scale import power_scale
+from limit_surface_ros.surface.linalg import solve_symmetric
+
+if TYPE_CHECKING:
+    from limit_surface_ros.checks import Floats
+
+
+class PowerGauge:
+    """g(f) with H(f / g) = 1, H(f) = sum_i (f' A_i f)^p_i and A_i = R_i' R_i."""
+
+    def __init__(self, roots: Floats, exponents: Floats) -> None:
+        """Keep the factors R_i (k, 3, 3) and the exponents p_i (k,)."""
+        self._roots = roots
+        self._forms = np.swapaxes(roots, 1, 2) @ roots
+        self._sizes = np.trace(self._forms, axis1=1, axis2=2)[:, np.newaxis]
+        self._exponents = exponents
+        self._scale = power_scale(exponents)
+
+    def values(self, loads: Floats) -> Floats:
+        """Return g (m,)."""
+        images = self._roots @ loads
+        return self._scale.load_factors(np.einsum("kcm,kcm->km", images, images))
+
+    def values_and_normals(self, loads: Floats) -> tuple[Floats, Floats]:
+        """Return g (m,) and vectors (3, m) along its gradient, of any length.
+
+        A term that does not see a load adds nothing to them.
+        """
+        roots = self._roots.reshape(-1, 3)
+        images = (roots @ loads).reshape(-1, 3, loads.shape[1])
+        forms = np.einsum("kcm,kcm->km", images, images)
+        values, weights = self._scale.load_factors_and_weights(forms)
+        images *= weights[:, np.newaxis]
+        return values, np.asarray(roots.T @ images.reshape(-1, loads.shape[1]))
+
+    def derivatives(self, loads: Floats, smoothing: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return g, its gradient and its Hessian; see `plane_minimum.Gauge`.
+
+        With q_i = f' A_i f and h_i = (q_i / g^2)^p_i, which sum to 1, implicit differentiation of
+        sum_i exp(p_i log q_i - 2 p_i t) = 1 gives those of t = log g.
+        """
+        images = self._roots @ loads
+        values = np.einsum("kcm,kcm->km", images, images) + self._sizes * smoothing**2
+        gauge = self._scale.load_factors(values)
+        t = np.log(gauge)
+        total = np.zeros_like(t)
+        second_total = np.zeros_like(t)
+        gradient: Floats = np.zeros_like(loads)
+        mixed: Floats = np.zeros_like(loads)
+        hessian: Floats = np.zeros((3, *loads.shape))
+        for root, form, image, value, p in zip(
+            self._roots, self._forms, images, values, self._exponents, strict=True
+        ):
+            safe = np.where(value > 0.0, value, np.inf)
+            share = 2.0 * p * np.exp(p * (np.log(np.maximum(value, 1e-300)) - 2.0 * t))
+            weight = share / safe
+            pull = root.T @ image
+            total += share
+            second_total += 2.0 * p * share
+            gradient += weight * pull
+            mixed += 2.0 * p * weight * pull
+            bend = (2.0 * p - 2.0) * weight / safe
+            hessian += weight * form[:, :, np.newaxis] + bend * pull[:, np.newaxis] * pull
+        gradient /= total
+        across = mixed[:, np.newaxis] * gradient
+        hessian -= across + across.swapaxes(0, 1)
+        hessian /= total
+        hessian += (second_total / total + 1.0) * gradient[:, np.newaxis] * gradient
+        return gauge, gauge * gradient, gauge * hessian
+
+    def ellipsoids(self, loads: Floats) -> Floats:
+        """Return P (m, 3, 3): ellipsoids f' P^-1 f = 1 within the surface, touching it.
+
+        Args:
+            loads: Directions in which they touch, shape (3, m).
+        """
+        return np.asarray(np.linalg.inv(np.moveaxis(self._tangent_forms(loads), 2, 0)))
+
+    def along_ellipsoids(self, loads: Floats, normals: Floats) -> Floats:
+        """Return P n (3, m), along the load of most power n.f on each of `ellipsoids`."""
+        return solve_symmetric(self._tangent_forms(loads), normals)
+
+    def _tangent_forms(self, loads: Floats) -> Floats:
+        """Return P^-1 (3, 3, m), quadratic forms that are 1 on ellipsoids within the surface.
+
+        Each q^p is concave in q, so that its tangent in q, a quadratic form of the load, lies
+        above it: on the surface, sum_i p_i h_i (q_i / q_i0 - 1) <= 0 bounds a set within it.
+        """
+        images = self._roots @ loads
+        values = np.einsum("kcm,kcm->km", images, images)
+        values = np.maximum(values, 1e-30 * self._sizes * (loads * loads).sum(axis=0))
+        gauge, weights = self._scale.load_factors_and_weights(values)
+        weights *= gauge * gauge / (weights * values).sum(axis=0)
+        forms: Floats = (self._forms.reshape(-1, 9).T @ weights).reshape(3, 3, -1)
+        # Beside a ridge one term outweighs all others: keep the form regular.
+        diagonal = np.einsum("iim->im", forms)
+        diagonal += 1e-13 * diagonal.sum(axis=0)
+        return forms
+
+    def corners(self) -> Corners | None:
+        """Return the loads that one norm, a term of exponent 1/2 and rank two, does not see."""
+        flat = np.abs(self._roots).any(axis=2).sum(axis=1) == 2
+        roots = self._roots[flat & (self._exponents == 0.5), :2]
+        axes = np.cross(roots[:, 0], roots[:, 1])
+        axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+        images = self._roots @ axes.T
+        values = np.einsum("kcm,kcm->km", images, images)
+        values[values <= 1e-20 * self._sizes] = 0.0
+        alone = (values > 0.0).sum(axis=0) == len(self._roots) - 1
+        values, images, axes, roots = (
+            values[:, alone],
+            images[:, :, alone],
+            axes[alone],
+            roots[alone],
+        )
+        scale = 1.0 / self._scale.load_factors(values)
+        gradient: Floats = np.zeros((3, len(axes)))
+        hessian: Floats = np.zeros((3, 3, len(axes)))
+        for root, form, image, value, p in zip(
+            self._roots,
+            self._forms,
+            images * scale,
+            values * scale**2,
+            self._exponents,
+            strict=True,
+        ):
+            safe = np.where(value > 0.0, value, np.inf)
+            weight = 2.0 * p * np.power(safe, p - 1.0)
+            pull = root.T @ image
+            gradient += weight * pull
+            bend = (2.0 * p - 2.0) / safe * pull[:, np.newaxis] * pull
+            hessian += weight * (form[:, :, np.newaxis] + bend)
+        return Corners.of_norms(axes * scale[:, np.newaxis], roots, gradient, hessian)

@@ -1,0 +1,117 @@
+"""Support points: the exact limit surface of a body on finitely many contacts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from limit_surface_ros.checks import as_floats, as_positive
+from limit_surface_ros.errors import GeometryError, RangeError, ShapeError
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.dissipation_surface import DissipationSurface
+from limit_surface_ros.surface.gauges.norm_sum import PointTerms
+from limit_surface_ros.surface.support.many_points import ManyPointsInverse
+from limit_surface_ros.surface.scaling import Scaling
+from limit_surface_ros.surface.support.tabulated import TabulatedInverse
+
+if TYPE_CHECKING:
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.support.solvers import Inverse
+
+# Points from which their sums are the cost of a twist, and single precision pays.
+_MANY = 64
+# Scaled distance of the points from the reference point beyond which it does not.
+_FAR = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class PointContacts(DissipationSurface):
+    """The limit surface of support points with isotropic Coulomb friction.
+
+    A point p_k that moves with w_k resists with m_k w_k / |w_k|; a point at rest resists with any
+    force up to m_k, which makes a facet of the surface. See Goyal, Ruina and Papadopoulos (1991),
+    doi:10.1016/0043-1648(91)90104-3.
+
+    Attributes:
+        points: Support points about the reference point [m], shape (n, 2).
+        friction_limits: Friction each point can give, mu_k N_k [N], shape (n,).
+        scaling: Characteristic length [m] and friction force [N].
+
+    Raises:
+        ShapeError: The shapes do not fit.
+        NotFiniteError: A number is NaN or infinite.
+        RangeError: A friction limit is negative.
+        GeometryError: There is no point, or no point carries any friction.
+    """
+
+    kind: ClassVar[str] = "point_contacts"
+
+    points: Floats
+    friction_limits: Floats
+    scaling: Scaling = field(default_factory=Scaling)
+
+    def __post_init__(self) -> None:
+        """Check the arrays and scale them."""
+        points = as_floats("points", self.points).copy()
+        limits = as_floats("friction_limits", self.friction_limits).copy()
+        if points.size == 0:
+            raise GeometryError("a body needs at least one support point, got none")
+        if points.ndim != 2 or points.shape[1] != 2:
+            raise ShapeError(f"points must have shape (n, 2), got {points.shape}")
+        if limits.shape != (len(points),):
+            raise ShapeError(
+                f"friction_limits must have shape ({len(points)},), one for each point, "
+                f"got {limits.shape}"
+            )
+        if not (limits >= 0.0).all():
+            raise RangeError(f"friction_limits must not be negative, got {limits.min()}")
+        if not limits.any():
+            raise GeometryError("no support point carries friction: every limit is 0")
+        for array in (points, limits):
+            array.setflags(write=False)
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "friction_limits", limits)
+
+    def with_friction_force(self, friction_force: float) -> PointContacts:
+        """Return the same body under another weight; see `ScaledSurface`.
+
+        Every friction limit grows in the ratio of the friction force scales.
+        """
+        force = as_positive("friction_force", friction_force)
+        return PointContacts(
+            self.points,
+            self.friction_limits * (force / self.scaling.friction_force),
+            replace(self.scaling, friction_force=force),
+        )
+
+    def dissipation(self) -> Dissipation:
+        """Return the same surface as a `Dissipation` with one matrix of rank two per point."""
+        return Dissipation(self.scaled_forms, self.scaling)
+
+    @property
+    def scaled_forms(self) -> Floats:
+        """The matrices m_k^2 J_k' J_k with w_k = J_k v, in scaled variables, shape (k, 3, 3)."""
+        sliding = self.friction_limits > 0.0
+        limits = self.friction_limits[sliding] / self.scaling.friction_force
+        x, y = self.points[sliding].T / self.scaling.characteristic_length
+        zeros, ones = np.zeros_like(x), np.ones_like(x)
+        forms = np.array([[ones, zeros, -y], [zeros, ones, x], [-y, x, x * x + y * y]])
+        return np.asarray(np.moveaxis(forms * limits**2, -1, 0))
+
+    @cached_property
+    def _terms(self) -> PointTerms:
+        return PointTerms(
+            self.points / self.scaling.characteristic_length,
+            self.friction_limits / self.scaling.friction_force,
+        )
+
+    @cached_property
+    def _inverse(self) -> Inverse:
+        terms = self._terms
+        if len(terms.points) < _MANY or np.abs(terms.points).max() > _FAR:
+            return super()._inverse
+        many = ManyPointsInverse(terms.points, terms.limits, self._inverse_of_any)
+        return TabulatedInverse(many, many)

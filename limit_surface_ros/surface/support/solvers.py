@@ -1,0 +1,244 @@
+"""Points of most power on a surface given by its gauge: the inverse of its normals.
+
+Where the surface is convex one climb from a good start is enough; a normal in the cone of a
+corner is met exactly, without climbing. Elsewhere all peaks of a table of starts are climbed.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+import numpy as np
+
+from limit_surface_ros.surface.support.newton import Gauge, certain_minimum, plane_minimum
+from limit_surface_ros.surface.sphere import even_directions, of_unit_length
+
+if TYPE_CHECKING:
+    from limit_surface_ros.checks import Bools, Floats, Places
+    from limit_surface_ros.surface.gauges.corners import Corners
+
+# Neighbours of a start among which it must be best to be a peak.
+_NEIGHBOURS = 8
+# Distance from a corner's cone, in its radii, up to which the start beside it may be the better.
+_BESIDE = 4.0
+# Vectors whose table stays in the processor's cache.
+_TABLE_COLUMNS = 200
+# A lower peak is climbed if the table shows at least this part of the best one's power.
+_WORTH = 0.7
+# Steps by upper bounds before Newton's method: each at least halves the way to a ridge.
+_BOUND_STEPS = 6
+# Effort for the axes in which a surface is about round.
+_FRAME_POINTS = 300
+_FRAME_STEPS = 6
+
+
+class Inverse(Protocol):
+    """Finds, for vectors n, the points of a surface with the largest n.x."""
+
+    def solve(self, normals: Floats) -> tuple[Floats, Floats]:
+        """Return the points (3, m) for vectors (3, m), none zero, and the largest n.x (m,)."""
+        ...
+
+    def starts_of_one(self, normal: Floats) -> Floats:
+        """Return points (s, 3) that lead smoothly to the answer for one vector (3,), if any do."""
+        ...
+
+
+@runtime_checkable
+class BoundedGauge(Gauge, Protocol):
+    """A gauge with an ellipsoid inside its surface through each point of it."""
+
+    def ellipsoids(self, points: Floats) -> Floats:
+        """Return P (m, 3, 3): the ellipsoids x' P^-1 x = 1 touch the surface at points (3, m)."""
+        ...
+
+    def along_ellipsoids(self, points: Floats, normals: Floats) -> Floats:
+        """Return P n (3, m) for normals n (3, m), with P as `ellipsoids` gives it."""
+        ...
+
+
+class ConvexInverse:
+    """Points x of g(x) = 1 with the largest n.x, for a convex gauge g."""
+
+    def __init__(self, gauge: Gauge, directions: Floats, corners: Corners | None = None) -> None:
+        """Prepare the table of starts.
+
+        Args:
+            gauge: The gauge g, above 0 but at 0.
+            directions: Where to start from, spread over the sphere, shape (3, d).
+            corners: Corners of the surface, if it has any.
+        """
+        self._gauge = gauge
+        self.corners = corners
+        values, gradients, hessians = gauge.derivatives(directions, np.zeros(directions.shape[1]))
+        self._starts = directions / values
+        self._gradients = gradients
+        self._hessians = hessians * values
+
+    def solve(self, normals: Floats) -> tuple[Floats, Floats]:
+        """Return the points (3, m) of most power for vectors (3, m), and that power (m,).
+
+        Raises:
+            SolverError: A point could not be certified.
+        """
+        units = of_unit_length(normals)
+        if self.corners is None:
+            points = self._climb(units)
+        else:
+            distance, points = self.corners.nearest(units)
+            smooth = np.flatnonzero(distance > 1.0)
+            if len(smooth):
+                near = points.take(smooth, axis=1)
+                beside = distance[smooth] < _BESIDE
+                points[:, smooth] = self._climb(units.take(smooth, axis=1), near, beside)
+        points /= self._gauge.values(points)
+        return points, (normals * points).sum(axis=0)
+
+    def _climb(
+        self, units: Floats, near: Floats | None = None, beside: Bools | None = None
+    ) -> Floats:
+        """Return the points of most power for unit vectors (3, m), from the better of two starts.
+
+        Args:
+            units: The vectors.
+            near: Points (3, m) by the corners nearest to them.
+            beside: Where these are worth a look, (m,).
+        """
+        points, gradients, hessians = self.starts(units)
+        values = np.ones(units.shape[1])
+        if near is not None and beside is not None:
+            near = near / self._gauge.values(near)
+            better = (units * near).sum(axis=0) > (units * points).sum(axis=0)
+            place = np.flatnonzero(beside & better)
+            points[:, place] = near = near.take(place, axis=1)
+            found = self._gauge.derivatives(near, np.zeros(len(place)))
+            values[place], gradients[:, place], hessians[:, :, place] = found
+        return certain_minimum(self._gauge, units, points, (values, gradients, hessians))
+
+    def starts(self, normals: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return starts (3, m) for vectors (3, m), with their gradients and Hessians (3, 3, m)."""
+        which = np.argmax(normals.T @ self._starts, axis=1)
+        return (
+            self._starts.take(which, axis=1),
+            self._gradients.take(which, axis=1),
+            self._hessians.take(which, axis=2),
+        )
+
+    def starts_of_one(self, normal: Floats) -> Floats:
+        """Return the start for one vector (3,), none where a corner might be the answer."""
+        if self.corners is not None:
+            return np.empty((0, 3))
+        return self.start_of_one(normal)[np.newaxis]
+
+    def start_of_one(self, normal: Floats) -> Floats:
+        """Return the start (3,) with the most power of the table for one vector (3,)."""
+        return np.asarray(self._starts[:, np.argmax(normal @ self._starts)])
+
+
+class PeakInverse:
+    """Points x of g(x) = 1 with the largest n.x, for a gauge that need not be convex.
+
+    The surface holds an ellipsoid through each point of a table. How far these reach along n is
+    known at once, and the peaks among them are climbed.
+    """
+
+    def __init__(self, gauge: Gauge, directions: Floats) -> None:
+        """Prepare the table and who is whose neighbour in it.
+
+        Args:
+            gauge: The gauge g, above 0 but at 0.
+            directions: Where to start from, spread over half the sphere and along any ridges of
+                the surface, shape (3, d).
+        """
+        self._gauge = gauge
+        self._ellipsoids = self._inside(directions / gauge.values(directions))
+        likeness = np.abs(directions.T @ directions)
+        nearest = np.argsort(-likeness, axis=1)[:, 1 : _NEIGHBOURS + 1]
+        self._neighbours = np.ascontiguousarray(nearest.T)
+
+    def solve(self, normals: Floats) -> tuple[Floats, Floats]:
+        """Return the points (3, m) of most power for vectors (3, m), and that power (m,)."""
+        units = of_unit_length(normals)
+        found = [
+            self._peaks(units[:, start : start + _TABLE_COLUMNS])
+            for start in range(0, units.shape[1], _TABLE_COLUMNS)
+        ]
+        rows = np.concatenate([row for row, _ in found])
+        columns = np.concatenate(
+            [column + _TABLE_COLUMNS * block for block, (_, column) in enumerate(found)]
+        )
+        climbed = units.take(columns, axis=1)
+        points = self._climb(climbed, self._ellipsoids[rows])
+        power = (points * climbed).sum(axis=0)
+        # The highest comes last, and stays.
+        rising = np.argsort(power)
+        best = np.zeros(units.shape[1], dtype=np.intp)
+        best[columns[rising]] = rising
+        summits = points.take(best, axis=1)
+        return summits, (normals * summits).sum(axis=0)
+
+    def starts_of_one(self, normal: Floats) -> Floats:
+        """Return the starts (s, 3) that are worth climbing for one vector (3,)."""
+        unit = normal / np.sqrt(normal @ normal)
+        reach = self._ellipsoids.reshape(-1, 9) @ np.multiply.outer(unit, unit).ravel()
+        high = reach >= _WORTH**2 * reach.max()
+        high &= reach >= np.maximum.reduce(reach.take(self._neighbours))
+        return np.asarray(self._ellipsoids[np.flatnonzero(high)] @ unit)
+
+    def _peaks(self, units: Floats) -> tuple[Places, Places]:
+        """Return the rows of the table that are worth climbing, and for which vectors (3, m)."""
+        squares = (units[:, np.newaxis] * units).reshape(9, -1)
+        reach = self._ellipsoids.reshape(-1, 9) @ squares
+        high = reach >= _WORTH**2 * reach.max(axis=0)
+        for neighbour in self._neighbours:
+            high &= reach >= reach[neighbour]
+        rows, columns = np.nonzero(high)
+        return rows, columns
+
+    def _inside(self, points: Floats) -> Floats:
+        """Return ellipsoids (m, 3, 3) within the surface through its points (3, m).
+
+        Where the gauge offers none they are no more than the lines to the points.
+        """
+        if isinstance(self._gauge, BoundedGauge):
+            return self._gauge.ellipsoids(points)
+        lines: Floats = np.einsum("im,jm->mij", points, points)
+        return lines
+
+    def _climb(self, units: Floats, ellipsoids: Floats) -> Floats:
+        points = np.einsum("mij,jm->im", ellipsoids, units)
+        if isinstance(self._gauge, BoundedGauge):
+            for _ in range(_BOUND_STEPS):
+                points /= np.abs(points).max(axis=0)
+                points = self._gauge.along_ellipsoids(points, units)
+        points, _, _ = plane_minimum(self._gauge, units, points, np.zeros(units.shape[1]))
+        return points / self._gauge.values(points)
+
+
+class FramedInverse:
+    """An inverse in other axes, in which the surface is about as wide in all directions."""
+
+    def __init__(self, frame: Floats, inverse: Inverse) -> None:
+        """Keep the frame F, points x = F y, and the inverse in y."""
+        self._frame = frame
+        self._inverse = inverse
+
+    def solve(self, normals: Floats) -> tuple[Floats, Floats]:
+        """Return the points (3, m) of most power for vectors (3, m), and that power (m,)."""
+        points, power = self._inverse.solve(self._frame.T @ normals)
+        return self._frame @ points, power
+
+    def starts_of_one(self, normal: Floats) -> Floats:
+        """Return points (s, 3) that lead smoothly to the answer for one vector (3,), if any do."""
+        return np.asarray(self._inverse.starts_of_one(self._frame.T @ normal) @ self._frame.T)
+
+
+def round_frame(gauge: Gauge) -> Floats:
+    """Return a matrix F (3, 3) so that the points y with g(F y) = 1 spread evenly about zero."""
+    directions = even_directions(_FRAME_POINTS).T
+    frame = np.eye(3)
+    for _ in range(_FRAME_STEPS):
+        points = frame @ directions
+        points /= gauge.values(points)
+        frame = np.linalg.cholesky(3.0 * points @ points.T / _FRAME_POINTS)
+    return frame

@@ -1,0 +1,60 @@
+"""The promise of Figures 3.6 to 3.12: fits made once, errors measured afresh, claims judged."""
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from limit_surface_ros.thesis.fits import FAMILIES, LABELS, Fit, fitted, training_pairs
+from limit_surface_ros.thesis.run import carry_out
+from limit_surface_ros.thesis.settings import QUICK
+from limit_surface_ros.thesis.store import Store
+from limit_surface_ros.thesis.studies import STUDIES
+from limit_surface_ros.thesis.surface_errors import Errors, thesis_fits
+
+pytest.importorskip("matplotlib", reason="matplotlib draws the pictures")
+
+TINY = replace(QUICK, motions=120, per_facet=8, tests=100, directions=60, starts=2)
+
+
+def test_every_figure_of_both_chapters_has_its_counterpart():
+    numbers = [study.number for study in STUDIES]
+    assert numbers == [f"2.{n}" for n in range(1, 17)] + [f"3.{n}" for n in range(1, 13)]
+
+
+def test_every_family_has_a_label():
+    assert set(LABELS) == set(FAMILIES)
+
+
+def test_noise_changes_loads_and_motions_by_about_what_is_said():
+    clean, noisy = (training_pairs("whole_face", flag, TINY) for flag in (False, True))
+    assert np.std(noisy.wrenches - clean.wrenches) == pytest.approx(TINY.noise, rel=0.2)
+
+
+def test_errors_of_load_and_motion_are_sorted_and_within_their_range(tmp_path):
+    errors = Errors(thesis_fits("three_points")[-2:], Store(tmp_path, TINY))
+    for values in (*errors.velocity.values(), *errors.force.values()):
+        assert (np.diff(values) >= 0.0).all()
+    assert all(v[0] >= 0.0 and v[-1] <= 2.0 for v in errors.velocity.values())
+
+
+def test_a_fit_is_the_same_when_it_is_read_again(tmp_path):
+    fit = Fit("three_points", "norms3")
+    first = fitted(fit, Store(tmp_path, TINY))
+    again = fitted(fit, Store(tmp_path, TINY))
+    np.testing.assert_array_equal(first.matrices, again.matrices)
+
+
+def test_the_figures_of_errors_judge_claims_and_leave_their_numbers(tmp_path):
+    studies = [study for study in STUDIES if study.number in ("3.9", "3.12")]
+    steps = []
+    page = carry_out(studies, Store(tmp_path, TINY), lambda *step: steps.append(step))
+    assert steps[-1][0] == steps[-1][1]
+    assert page.read_text().count('class="yes"') + page.read_text().count('class="no"') == 8
+    with (tmp_path / "figure_3_09" / "velocity.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == TINY.tests
+    assert float(rows[-1]["share"]) == 1.0
+    assert "4th order polynomial" in rows[0]
+    assert len(list((tmp_path / "models").glob("*.yaml"))) > 20
