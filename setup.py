@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Build description of the ament_python package limit_surface_ros."""
 
 from pathlib import Path

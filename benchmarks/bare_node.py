@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What our node is measured against: the same interfaces with handlers that do nothing.
 
 Usage: python bare_node.py NAME

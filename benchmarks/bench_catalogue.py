@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """fit_catalogue on one process, two, and Dask; and what an object costs beside its fit."""
 
 from __future__ import annotations

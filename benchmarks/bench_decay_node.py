@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The decay node's stream against a plain rclpy timer: rate, drift and delay over 10 s.
 
 Both publish WrenchStamped from a process of their own; this one subscribes. The stream runs in

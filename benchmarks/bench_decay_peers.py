@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Decay fits beside what a user would write or take instead, on the hockey stick's response.
 
 The memory kernel by a dense matrix and the characteristic roots by Newton's method from even
@@ -22,12 +23,12 @@ from interleaved import interleaved
 from scipy import linalg
 
 from limit_surface_ros.decay import examples
+from limit_surface_ros.decay.delay.kernel import memory_kernel
+from limit_surface_ros.decay.delay.roots import roots_in_box
 from limit_surface_ros.decay.delay.system import DelaySystem
 from limit_surface_ros.decay.fit import fit_decay
-from limit_surface_ros.decay.delay.kernel import memory_kernel
 from limit_surface_ros.decay.rate_choice import judged, take
 from limit_surface_ros.decay.rates_esprit import damped
-from limit_surface_ros.decay.delay.roots import roots_in_box
 from limit_surface_ros.decay.targets import Target
 
 Method = Callable[[np.ndarray, float, int], np.ndarray]

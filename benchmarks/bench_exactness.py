@@ -1,10 +1,12 @@
+# SPDX-License-Identifier: Apache-2.0
 """How exact the maps are: facets, round trips, scales, loads of most power, cells of patches."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from limit_surface_ros.surface import measures, sampling, shapes
+from limit_surface_ros.surface import measures, sampling
+from limit_surface_ros.surface.contact import shapes
 from limit_surface_ros.surface.contact.patch import ContactPatch
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts

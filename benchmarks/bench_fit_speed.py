@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How fast a surface is fitted: against finite differences, least squares and an SDP; and scale.
 
 The work: three terms, J2, 2900 pairs of three support points (thesis 3.4). The peers get the very
@@ -17,17 +18,17 @@ from scipy.optimize import least_squares, minimize
 from limit_surface_ros.errors import MissingExtraError
 from limit_surface_ros.fitting.cholesky import factors_of, matrices_of
 from limit_surface_ros.fitting.dissipation import fit_dissipation
-from limit_surface_ros.fitting.search import Search, descend, process_pool
+from limit_surface_ros.fitting.pairs import ScaledPairs, scale_pairs
 from limit_surface_ros.fitting.polynomial import fit_polynomial
 from limit_surface_ros.fitting.power_sum import fit_power_sum
 from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
 from limit_surface_ros.fitting.result import FitResult
-from limit_surface_ros.fitting.pairs import ScaledPairs, scale_pairs
+from limit_surface_ros.fitting.search import Search, descend, process_pool
 from limit_surface_ros.fitting.simulation import simulated_pairs
-from limit_surface_ros.surface.measures import quantiles, velocity_error
-from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.kinds.power_sum import thesis_exponents
+from limit_surface_ros.surface.measures import quantiles, velocity_error
+from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.sampling import random_motions
 from limit_surface_ros.surface.scaling import Scaling
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Speed of the maps, alone and in batches, against the peers in one run.
 
 The peers are the closed form of the ellipsoid in plain numpy, which no model can beat, the convex
@@ -11,7 +12,7 @@ import numpy as np
 from interleaved import interleaved
 from scipy.optimize import root
 
-from limit_surface_ros.surface import shapes
+from limit_surface_ros.surface.contact import shapes
 from limit_surface_ros.surface.contact.patch import ContactPatch
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts

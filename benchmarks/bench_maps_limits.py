@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How far batches of maps are from a plain C loop, whether cost stays linear, and peak memory."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recorded pushes: how well the automatic fit predicts pushes that it has not seen.
 
 Five sets of 50 pushes with their fixed splits (../shared/data/pushing). Mean angle [deg] between
@@ -20,13 +21,13 @@ import numpy as np
 from limit_surface_ros.errors import LimitSurfaceError, MissingExtraError
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.fitting.few_pushes.automatic import fit_automatically
-from limit_surface_ros.fitting.search import Search
+from limit_surface_ros.fitting.pairs import scaling_of_pairs
 from limit_surface_ros.fitting.polynomial import fit_polynomial
 from limit_surface_ros.fitting.power_sum import fit_power_sum
-from limit_surface_ros.fitting.pairs import scaling_of_pairs
-from limit_surface_ros.surface.measures import mean_angle
+from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.kinds.power_sum import thesis_exponents
+from limit_surface_ros.surface.measures import mean_angle
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data" / "pushing"
 METHODS = ("ellipsoid", "convex 4th order", "auto", "auto with support")

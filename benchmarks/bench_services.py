@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Services and topics of both nodes against a node with empty handlers of the same types.
 
 Usage: python benchmarks/bench_services.py

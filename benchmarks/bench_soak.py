@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The limit_surface node under load for half a minute: nothing lost, nothing wrong, nothing grows.
 
 Usage: python benchmarks/bench_soak.py [SECONDS]

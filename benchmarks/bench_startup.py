@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """From process start to the first answered call: our node against an empty one, and many models.
 
 Needs a sourced ROS 2 with this package built; `make bench` sees to it.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Chapter 3 of the thesis: every model on three support points and on patches.
 
 Each stands beside the best figures known before.
@@ -23,18 +24,18 @@ import numpy as np
 
 from limit_surface_ros.errors import LimitSurfaceError, MissingExtraError
 from limit_surface_ros.fitting.dissipation import fit_dissipation
-from limit_surface_ros.fitting.search import Search, process_pool
 from limit_surface_ros.fitting.polynomial import fit_polynomial
 from limit_surface_ros.fitting.power_sum import fit_power_sum
 from limit_surface_ros.fitting.result import FitResult
+from limit_surface_ros.fitting.search import Search, process_pool
 from limit_surface_ros.fitting.second_approximation import fit_second_approximation
 from limit_surface_ros.fitting.simulation import simulated_pairs
-from limit_surface_ros.surface import shapes
+from limit_surface_ros.surface.contact import shapes
 from limit_surface_ros.surface.contact.patch import ContactPatch
-from limit_surface_ros.surface.measures import force_error, load_error, quantiles
-from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.kinds.power_sum import thesis_exponents
+from limit_surface_ros.surface.measures import force_error, load_error, quantiles
+from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.protocol import LimitSurface
 from limit_surface_ros.surface.sampling import random_directions, random_motions
 from limit_surface_ros.surface.scaling import Scaling

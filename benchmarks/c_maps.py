@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The maps as a plain loop in C (c_maps.c), compiled when a benchmark asks for it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The least that a Python node can be: one service that answers. The peer of start-up times."""
 
 import rclpy

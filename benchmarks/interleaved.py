@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Times of several ways to do one thing, measured in turns so that they share what disturbs."""
 
 from __future__ import annotations

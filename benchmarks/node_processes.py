@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Nodes in processes of their own, and calls of their services, for the benchmarks."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Run benchmarks and keep what they print, with date and machine, in benchmarks/RESULTS.md.
 
 Usage: python benchmarks/run.py [NAME...]

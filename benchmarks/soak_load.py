@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What bench_soak.py loads a node with; each function is the work of a process of its own.
 
 One thread and rclpy's EventsExecutor: what the load itself costs, and how late it sends and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How the documentation is built: `make docs`; every warning is an error."""
 
 import re

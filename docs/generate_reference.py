@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Write the pages of reference that follow from the code, so that they cannot drift from it.
 
 Interfaces from the .srv and .msg files with their comments, parameters from the nodes' tables,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Launch the decay node.
 
 ros2 launch limit_surface_ros decay.launch.py models:=/my/decays onset:=/arm/contact_lost

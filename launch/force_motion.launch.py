@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Launch the limit_surface and the decay node in one process.
 
 ros2 launch limit_surface_ros force_motion.launch.py namespace:=left wrench:=/ft

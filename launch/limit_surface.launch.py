@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Start a node of this package: ros2 launch limit_surface_ros limit_surface.launch.py.
 
 `ros2 launch limit_surface_ros limit_surface.launch.py --show-args` lists what can be given.

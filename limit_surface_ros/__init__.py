@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Limit surfaces of sliding bodies and decay models: fitted offline, served over ROS 2.
 
 Layers, lowest first: `errors` and `checks`, then `surface`, `fitting`, `decay`, `files`, then

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How many threads BLAS may use in the processes of this package's programs and nodes."""
 
 import os

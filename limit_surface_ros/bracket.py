@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The root of a rising function of one number, by secants and halves."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Validation at the boundary: each check returns clean float64 numbers or raises.
 
 Each public function of the package checks its arguments once, here; inside, types are trusted.

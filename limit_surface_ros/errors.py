@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The package's one family of errors.
 
 Every error that the package raises on purpose derives from `LimitSurfaceError` *and* from the

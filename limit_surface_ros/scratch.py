@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Keeping the memory of temporaries in the process, from one batch to the next.
 
 glibc gives freed memory back to the system unless it has seen a large piece come and go, and each

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where every installed program starts: Ctrl-C ends it quietly, even while it still imports.
 
 A console script names `tools.PROGRAM` or `nodes.PROGRAM` of this module. What a program needs

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Check what the two package.xml files promise against the format, the code and each other."""
 
 from __future__ import annotations

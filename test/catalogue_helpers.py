@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A folder of recorded pushes for fit_catalogue."""
 
 from pathlib import Path

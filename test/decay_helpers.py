@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A simulated clock, decay models in files, and what tests of the decay node share."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Messages for the node tests, and processes of the package's programs."""
 
 from __future__ import annotations

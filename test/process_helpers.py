@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Programs in process groups of their own, none of which outlives its test."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Layers hold: a module imports only from its own layer and those below; only nodes know ROS."""
 
 from __future__ import annotations
@@ -13,8 +14,8 @@ import limit_surface_ros
 
 PACKAGE = "limit_surface_ros"
 ROOT = Path(limit_surface_ros.__file__).parent
-LAYERS = ["surface", "fitting", "decay", "files"]
-TOPS = ["nodes", "tools", "plots"]
+LAYERS = ["surface", "decay", "motion", "fitting", "files", "export"]
+TOPS = ["nodes", "tools", "plots", "thesis"]
 ROS = {
     "rclpy",
     "ament_index_python",
@@ -41,8 +42,9 @@ def allowed(layer: str) -> set[str]:
     if layer == "":
         return {""}
     if layer in TOPS:
-        # Programs that make pictures are tools, and need plots.
-        return {"", *LAYERS, layer, *(["plots"] if layer == "tools" else [])}
+        # Programs that make pictures are tools, and need plots; one rebuilds the thesis.
+        more = {"tools": ["plots", "thesis"], "thesis": ["plots"]}
+        return {"", *LAYERS, layer, *more.get(layer, [])}
     return {"", *LAYERS[: LAYERS.index(layer) + 1]}
 
 

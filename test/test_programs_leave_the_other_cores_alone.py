@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Programs and nodes keep BLAS to one thread, unless their user says otherwise."""
 
 import os

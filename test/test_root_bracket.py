@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A bracket shrinks around the root, across jumps and along flat parts too."""
 
 import math

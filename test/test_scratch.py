@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Batches do not ask the system for the same memory again and again."""
 
 import platform

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Ask the limit_surface node where a push moves an object.
 // Start the node first (ros2 run limit_surface_ros limit_surface_node), then run this program.
 #include <chrono>

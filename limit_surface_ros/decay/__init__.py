@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Decay models: from a decaying response to a sum of exponentials.
 
 The chain, each link of which can be used alone:

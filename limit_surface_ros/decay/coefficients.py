@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Coefficients of a sum of exponentials on fixed rates, in the norm of the analyst's choice.
 
 The rates stay as they are: more terms need a new linear fit and nothing else.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Coefficients re-estimated while samples of a response come in; the rates stay as they are.
 
 Fixed rates make a decay model linear in its coefficients, so that recursive least squares

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Named examples of decaying responses.
 
 The thesis does not print its second and third function; those here show the same numbers of
@@ -10,8 +11,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from limit_surface_ros.decay.delay.system import DelaySystem, from_quasi_polynomial
 from limit_surface_ros.decay.delay.pieces import PiecewisePolynomial
+from limit_surface_ros.decay.delay.system import DelaySystem, from_quasi_polynomial
 from limit_surface_ros.decay.targets import Analytic, PiecewiseLinear, Target
 from limit_surface_ros.errors import RangeError
 

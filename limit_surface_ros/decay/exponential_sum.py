@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sums of exponentials: what a decay model is, and all that a program that uses one needs.
 
 A sum stands for x(t) = Re sum_k c_k exp(lambda_k t), t >= 0, with one rate of each conjugate pair

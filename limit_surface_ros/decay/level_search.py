@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The last time at which the size of a decaying sum of exponentials exceeds a level.
 
 Intervals are cut into cells, and a cell is passed over only where a bound on the second derivative

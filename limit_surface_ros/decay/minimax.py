@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Discrete linear minimax: the c that minimises max_i |(A c - b)_i|, with a certificate.
 
 A primal-dual interior-point method with Mehrotra's predictor and corrector [1], on an orthonormal

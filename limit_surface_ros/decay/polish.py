@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Free rates: the largest error made smaller by moving rates and coefficients together.
 
 Sequential linear programming: each step linearises the sum in its rates, solves a minimax problem

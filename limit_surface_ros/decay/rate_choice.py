@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What methods of choosing rates share: their result, and how good rates are."""
 
 from __future__ import annotations

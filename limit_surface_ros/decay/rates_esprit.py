@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rates from samples alone: ESPRIT [1], the matrix pencil [2] of the dominant subspace.
 
 The samples' Hankel matrix has the rank of the number of exponentials; its dominant left singular

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rates in closed form: roots of the neutral equation x(t) = eps x(t - L), times tail rates.
 
 A response that ends after its support obeys x(t) = eps x(t - L) there for any small eps and any L

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One onset's response: a decay model scaled to an onset, and corrected by what is measured.
 
 Measurements come and predictions go as fractions of the onset, x(t) / x(0) with the x(0) of the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fits of a whole response, and of a record at its samples.
 
 An optimum on a grid is better there than between its points: with 61 pairs on 2000 points the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Noisy records: how noisy they are, and the piecewise linear response behind them.
 
 A memory kernel differentiates, so that noise of 1 % in the samples drowns it. A linear spline of

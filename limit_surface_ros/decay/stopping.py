@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """When a body that was set sliding comes to rest: a load that dies away by a decay model.
 
 A wrench of load factor s dies away as w(t) = w(0) x(t) / x(0). Friction is alike in both

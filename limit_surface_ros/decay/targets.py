@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Decaying responses: what is to be approximated, as functions of t >= 0 with known kinks."""
 
 from __future__ import annotations

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Model and data files to validated objects, and back."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files written in one step: readers see the old file or the new one, never a part."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pushes in ROS 2 bags: a topic of wrenches and one of motions, synchronised, quasi-static parts.
 
 The wrench topic holds WrenchStamped in the body's frame, about the reference point: the load on

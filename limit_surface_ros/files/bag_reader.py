@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Topics of recorded ROS 2 bags (sqlite3 and mcap), as times and numbers.
 
 Bags are read by rosbags (extra `bags`), without ROS. A message with a header counts at the

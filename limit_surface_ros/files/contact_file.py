@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Contact files: where and how hard a body presses on the ground, in YAML.
 
 Keys: `schema: 1`, `name`, `frame_id` (default "object"), `reference_point` ("centroid", the
@@ -24,8 +25,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.files.yaml_reader import place_errors, read_yaml
-from limit_surface_ros.surface import pressure as pressures
-from limit_surface_ros.surface import shapes
+from limit_surface_ros.surface.contact import pressure as pressures
+from limit_surface_ros.surface.contact import shapes
 from limit_surface_ros.surface.contact.patch import ContactPatch, natural_scaling
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 

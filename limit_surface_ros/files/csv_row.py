@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One line of a CSV file taken apart, or an error that names file and line."""
 
 from __future__ import annotations

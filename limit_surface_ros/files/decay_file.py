@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Decay models and their files.
 
 A file is YAML::
@@ -26,9 +27,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from limit_surface_ros.decay.delay.pieces import PiecewisePolynomial
 from limit_surface_ros.decay.delay.system import DelaySystem
 from limit_surface_ros.decay.exponential_sum import ExponentialSum
-from limit_surface_ros.decay.delay.pieces import PiecewisePolynomial
 from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.yaml_reader import Section, place_errors, read_yaml, write_yaml
 

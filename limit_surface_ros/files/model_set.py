@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Named models read from files, all or none: what a node serves.
 
 A set is immutable. To load other files, build another set and swap it in: while building fails,

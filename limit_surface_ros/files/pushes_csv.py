@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recorded pushes in CSV: one row per push, the wrench that acted and the twist that it caused.
 
 An optional first line `# {...}` holds a JSON object about the recording (`rho_m`,

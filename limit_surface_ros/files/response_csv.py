@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recorded responses in CSV: one row per sample, its time and the value that dies away.
 
 A first line may name the columns; without names the first column is the time and the second the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Surface model files: a limit surface with its name, frame and history, in YAML.
 
 Keys: `schema: 1`, `name`, `kind`, `frame_id`, `reference_point` [m], `characteristic_length` [m],

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """YAML files to checked values, and back: the one reader and writer of all model files.
 
 A `Section` is a mapping of a YAML file that knows where it stands, so that each error names the

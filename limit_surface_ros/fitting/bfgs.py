@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """BFGS for a few dozen parameters, in numpy alone, that can go on from a known curvature.
 
 scipy's minimisers spend more time around a cost of 0.1 ms than in it, their BLAS threads wait for

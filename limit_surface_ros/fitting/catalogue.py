@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Many independent jobs on any executor: each fails alone, and none is lost with a worker.
 
 The executor is a `concurrent.futures.Executor`: processes of this machine or, by a Dask client's

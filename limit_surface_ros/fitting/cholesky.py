@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Positive semidefinite matrices as free parameters: lower-triangular Cholesky factors.
 
 A = L L' is positive semidefinite for every L, so that an unconstrained optimiser can never leave

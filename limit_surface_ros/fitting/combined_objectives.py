@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Objectives made of others: their sum, and one that is held near known parameters."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What an error of motion costs: the squared chord between unit twists, or a robust form of it.
 
     rho(d) = d^2                                        for chords d = |v - v^|

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fits of dissipation models: on forces, on directions, on both, or held near support points."""
 
 from __future__ import annotations
@@ -12,14 +13,14 @@ from limit_surface_ros.fitting.dissipation_direction_objective import (
     DissipationDirectionObjective,
 )
 from limit_surface_ros.fitting.dissipation_force_objective import DissipationForceObjective
-from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.pairs import check_support, scale_pairs
+from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.solve import solve
 
 if TYPE_CHECKING:
     from limit_surface_ros.fitting.objective import Objective
-    from limit_surface_ros.fitting.result import FitResult
     from limit_surface_ros.fitting.pairs import ScaledPairs
+    from limit_surface_ros.fitting.result import FitResult
     from limit_surface_ros.surface.pairs import Pairs
     from limit_surface_ros.surface.scaling import Scaling
 

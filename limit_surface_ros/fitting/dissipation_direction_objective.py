@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Dissipation models fitted on directions: the model's motion of each load against the pair's.
 
 The cost is that of `motion_cost`, over the parameters of `dissipation_parameters`.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Dissipation models fitted on forces: the model's load at each motion against the pair's.
 
     J = sum_k m_k |grad D(v_k) - f_k|^2,   D(v) = sum_i sqrt(v' B_i v)

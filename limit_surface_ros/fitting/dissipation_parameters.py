@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The parameters of dissipation models: Cholesky factors, with a floor under every term.
 
     B = L L' + r trace(L L') I

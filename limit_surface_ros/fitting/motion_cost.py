@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a smooth dissipation model costs at recorded pushes, and how that changes with it.
 
     J = sum_k m_k (log(s_k)^2 + w rho(|v_k - v^_k|))

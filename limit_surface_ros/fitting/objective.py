@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a fit minimises: an objective builds the problem, `multi_start` solves it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pairs made dimensionless for a fit, and the checks that they can support one."""
 
 from __future__ import annotations

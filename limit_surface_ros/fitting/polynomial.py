@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fits of fourth-order polynomials: plain least squares, or with convexity as a constraint.
 
     J = sum_k (P(f_k) - 1)^2 + w |(I - v_k v_k') grad P(f_k)|^2
@@ -16,8 +17,8 @@ import numpy as np
 
 from limit_surface_ros.checks import as_floats
 from limit_surface_ros.errors import MissingExtraError, RangeError, SolverError
-from limit_surface_ros.fitting.result import FitResult, errors_on
 from limit_surface_ros.fitting.pairs import check_support, scale_pairs
+from limit_surface_ros.fitting.result import FitResult, errors_on
 from limit_surface_ros.surface.kinds.polynomial import MONOMIALS, Polynomial
 
 if TYPE_CHECKING:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fits of power sums: the thesis's J1 and J2, with a weight on the error of motion."""
 
 from __future__ import annotations
@@ -7,9 +8,9 @@ from typing import TYPE_CHECKING
 from limit_surface_ros.checks import as_floats
 from limit_surface_ros.errors import RangeError, ShapeError
 from limit_surface_ros.fitting.cholesky import PARAMETERS_PER_MATRIX
-from limit_surface_ros.fitting.search import Search
-from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
 from limit_surface_ros.fitting.pairs import check_support, scale_pairs
+from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
+from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.solve import solve
 
 if TYPE_CHECKING:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """J1 and J2 of a power sum, with their gradient by matrix calculus (thesis 3.5 to 3.10).
 
     J = sum_k m_k ((H(f_k) - 1)^2 + w rho(|v_k - v^(f_k)|)),   H(f) = sum_i (f' A_i f)^(p_i)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a fit returns: the surface, how it was found, and how good it is."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Descents from several seeded starts: in parallel, in a fixed order, stopped when they agree.
 
 Fits of limit surfaces have many local minima, and the deepest may attract one random start in

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The second approximation of the thesis (3.14): one matrix by least squares inside the other.
 
 H(f) = f' A f + sqrt(f' B f), with B = L L' free and A the symmetric matrix that solves
@@ -26,10 +27,10 @@ from limit_surface_ros.fitting.cholesky import (
     parameters_of,
 )
 from limit_surface_ros.fitting.direction_loss import direction_loss
-from limit_surface_ros.fitting.search import Search, descend, descents
+from limit_surface_ros.fitting.pairs import check_support, scale_pairs
 from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
 from limit_surface_ros.fitting.result import FitResult, errors_on
-from limit_surface_ros.fitting.pairs import check_support, scale_pairs
+from limit_surface_ros.fitting.search import Search, descend, descents
 from limit_surface_ros.fitting.solve import is_sound
 from limit_surface_ros.surface.kinds.power_sum import PowerSum, thesis_exponents
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Simulated training data: random motions, loads on facets, and noise (thesis 3.3 and 3.5)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Motions of loads under a smooth dissipation model, and how they change with the model.
 
 The motion of a load f is where D is least on the plane f . v = 1. With a basis (z1, z2) of the

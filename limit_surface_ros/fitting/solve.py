@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """From an objective to a result: descend, choose the best sound start, measure it."""
 
 from __future__ import annotations
@@ -8,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.errors import SolverError
-from limit_surface_ros.fitting.search import descents
 from limit_surface_ros.fitting.result import FitResult, errors_on
+from limit_surface_ros.fitting.search import descents
 
 if TYPE_CHECKING:
-    from limit_surface_ros.fitting.search import Descent, Search
     from limit_surface_ros.fitting.objective import Objective
+    from limit_surface_ros.fitting.search import Descent, Search
     from limit_surface_ros.surface.pairs import Pairs
     from limit_surface_ros.surface.protocol import LimitSurface
 

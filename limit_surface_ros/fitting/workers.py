@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pools of processes that an interrupt ends at once and that never outlive their parent."""
 
 from __future__ import annotations

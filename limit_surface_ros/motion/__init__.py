@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """What bodies do: how they move when they are pushed, slide and rest."""

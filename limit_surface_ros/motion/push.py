@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Quasi-static pushing with one point of contact: how a pushed body moves, and if it sticks.
 
 A pusher touches the body at a point and moves with a given velocity. Its force lies in the
@@ -17,9 +18,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from limit_surface_ros.bracket import root_bracket
 from limit_surface_ros.checks import as_floats
 from limit_surface_ros.errors import RangeError, ShapeError, ZeroVectorError
-from limit_surface_ros.bracket import root_bracket
 from limit_surface_ros.surface.kinds.dissipation_surface import DissipationSurface
 
 if TYPE_CHECKING:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Errors as services tell them: a code and a sentence."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Messages to arrays and back; numbers are checked here, at the boundary."""
 
 from __future__ import annotations

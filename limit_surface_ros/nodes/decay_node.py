@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The `decay` node: how a load dies away after its onset, and when sliding stops."""
 
 from __future__ import annotations

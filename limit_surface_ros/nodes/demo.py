@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Program: show the two nodes at work.
 
 Starts both nodes in a process of their own and asks the first from this one what a handful of

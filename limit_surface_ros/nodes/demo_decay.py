@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The decay part of the demonstration: an onset, the falling wrench, and when sliding stops."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A node's health on /diagnostics, once a second if not asked otherwise."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The `limit_surface` and the `decay` node in one process and one executor.
 
 A parameter given as -p NAME:=VALUE goes to both; -p limit_surface:NAME:=VALUE and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """From the frame of a message to the frame of a model: static transforms, and tf2 where it is.
 
 tf2_ros is optional: it is imported when a node starts, and without it (it is not on the Python

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a node has seen since it started: the numbers behind its diagnostics. ROS-free."""
 
 from __future__ import annotations

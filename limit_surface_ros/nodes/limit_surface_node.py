@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The `limit_surface` node in a process of its own: wrench to twist and twist to wrench."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Markers for RViz: pure functions from surfaces, loads and motions to messages.
 
 Loads are drawn in load space, x and y the force, z the moment over the characteristic length, with
@@ -16,8 +17,8 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from limit_surface_ros.surface.mesh import mesh_of
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+from limit_surface_ros.surface.mesh import mesh_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The models that a node serves: read all or none, swapped in one step, reloaded on request."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Models as `~/list_models` tells of them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the nodes of this package share: models, guarded services and topics, diagnostics.
 
 A node built on `ModelNode` adds services and inputs with handlers that convert, call the core and

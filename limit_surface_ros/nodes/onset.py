@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An onset as it came in: the load at t = 0, and how it dies away from there."""
 
 from __future__ import annotations

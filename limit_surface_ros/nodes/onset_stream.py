@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The falling wrench and its value, published while an onset dies away."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A table of settings as ROS parameters: described, validated when set, applied afterwards."""
 
 from __future__ import annotations

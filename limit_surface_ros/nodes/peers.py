@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Who is about that should not be: namesakes, and peers of another type or of unlike QoS.
 
 Asked of the graph once a diagnostics period. rclpy's event handlers would say it at once, but they

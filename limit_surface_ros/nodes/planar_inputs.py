@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Stamped wrenches and twists to planar ones about a model's reference point, in its frame."""
 
 from __future__ import annotations
@@ -9,8 +10,8 @@ import numpy as np
 from limit_surface_ros.errors import RangeError
 from limit_surface_ros.nodes import convert
 from limit_surface_ros.nodes.settings import Setting
-from limit_surface_ros.surface.planar import out_of_plane, planar
 from limit_surface_ros.surface.frames import RigidTransform
+from limit_surface_ros.surface.planar import out_of_plane, planar
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """When a steady stream is due: stamps start + k / rate, counted and not added up. ROS-free.
 
 A timer that fires late, or a simulated clock that ticks coarsely, delays messages but neither

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Call services from a program: a node spun in a thread, plain calls that wait for the answer."""
 
 from __future__ import annotations

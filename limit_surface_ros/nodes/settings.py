@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Settings of a node: name, default, what is accepted and what it means, in one row each.
 
 ROS-free: `parameters` turns rows into declared parameters with descriptors.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Run nodes until SIGINT or SIGTERM, and end with exit code 0, no traceback and no reply lost.
 
 The signals only wake a thread that asks the executor to end between two callbacks: none is cut in

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Stamps of messages as integer nanoseconds, and back."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Transforms between frames that are given once, as texts; ROS-free.
 
 Each text reads `parent child x y z roll pitch yaw` or `parent child x y z qx qy qz qw`: the pose

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the `limit_surface` node shows in RViz, made and sent only while somebody looks."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The `limit_surface` node: wrench to twist and twist to wrench over services and topics."""
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from limit_surface_interfaces.srv import (
 )
 
 from limit_surface_ros.files.surface_file import SurfaceModel, read_surface_model
+from limit_surface_ros.motion.push import push
 from limit_surface_ros.nodes import convert, frames, planar_inputs, surface_markers
 from limit_surface_ros.nodes.model_host import model_settings
 from limit_surface_ros.nodes.model_info import Listing, model_info
@@ -23,7 +25,6 @@ from limit_surface_ros.nodes.planar_inputs import PlanarInputs
 from limit_surface_ros.nodes.settings import Setting
 from limit_surface_ros.nodes.surface_markers import SurfaceMarkers
 from limit_surface_ros.surface.planar import power
-from limit_surface_ros.motion.push import push
 
 if TYPE_CHECKING:
     from std_msgs.msg import Header

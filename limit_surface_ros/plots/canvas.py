@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One look for all pictures: colours that everybody can tell apart, and files that come out alike.
 
 Figures are made without matplotlib's global state, so a program that uses the library keeps its

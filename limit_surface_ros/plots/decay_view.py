@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures of decay models: response and fit, error, rates in the complex plane, projection."""
 
 from __future__ import annotations

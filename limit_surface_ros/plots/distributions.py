@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Empirical distributions of errors, side by side: which model is how far off how often."""
 
 from __future__ import annotations

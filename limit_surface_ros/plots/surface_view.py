@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures of limit surfaces: in load space, and cut through its three planes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What all kinds of surface share: validation, scaled variables, one vector or many.
 
 A kind implements its three maps on *scaled columns*: arrays of shape (3, m), contiguous by

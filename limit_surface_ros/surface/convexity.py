@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Which surfaces are convex, with the reason; and where one that is not bends inward."""
 
 from __future__ import annotations
@@ -8,16 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.surface.kinds.polynomial import Polynomial
 from limit_surface_ros.surface.gauges.power_sum import PowerGauge
+from limit_surface_ros.surface.kinds.polynomial import Polynomial
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.linalg import root_of
 from limit_surface_ros.surface.sphere import even_directions
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.support.newton import Gauge
     from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.surface.support.newton import Gauge
 
 # Directions of load that are looked at where no theorem decides.
 _DIRECTIONS = 20_000

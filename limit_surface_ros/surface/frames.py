@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Wrenches and twists seen from another frame: rotated, and moved with the lever arm.
 
 Six-vectors here are (force, torque) and (linear, angular velocity), each about the origin of its

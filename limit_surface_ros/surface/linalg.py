@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Positive semidefinite 3x3 matrices: validation, and factors that keep small values exact."""
 
 from __future__ import annotations

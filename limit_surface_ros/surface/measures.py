@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How far a model is from the truth: errors of motion and of load, and their distributions.
 
 All are measured in scaled variables, so that they are numbers without a unit: errors of unit

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Triangle meshes of limit surfaces, for pictures and RViz."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pairs of a wrench and the twist that it causes: what surfaces are fitted to and judged by."""
 
 from __future__ import annotations

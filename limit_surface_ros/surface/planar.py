@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Planar parts of spatial wrenches and twists, and how much they leave out."""
 
 from __future__ import annotations

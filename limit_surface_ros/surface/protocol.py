@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What every limit surface can do, whatever its kind.
 
 Wrenches are (fx, fy, tau_z) in [N, N, N m], applied *to* the body, about the model's reference

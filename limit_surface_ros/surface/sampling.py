@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pairs of load and motion drawn from a surface: what fits learn from and are tested on."""
 
 from __future__ import annotations

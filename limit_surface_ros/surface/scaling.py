@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scaled variables: wrench / (F0, F0, F0 rho) and twist * (1, 1, rho).
 
 In them forces and moments, and translations and rotations, weigh alike; directions are unit

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The unit sphere: directions spread evenly over it, and vectors brought onto it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The bodies of chapter 3, in the thesis's own units: lengths and forces near one."""
 
 from __future__ import annotations

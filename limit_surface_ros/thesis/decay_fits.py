@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figures 2.5 to 2.7: the hockey stick as a sum of 9, 15 and 123 exponentials."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figures 2.1 to 2.4: the hockey stick, its memory kernel and its characteristic roots."""
 
 from __future__ import annotations
@@ -10,11 +11,11 @@ import numpy as np
 
 from limit_surface_ros.decay.delay.closed_kernel import ClosedKernel
 from limit_surface_ros.decay.delay.construction import delay_system
-from limit_surface_ros.decay.examples import example, thesis_system
 from limit_surface_ros.decay.delay.impulses import find_impulses
 from limit_surface_ros.decay.delay.kernel import memory_kernel
 from limit_surface_ros.decay.delay.pieces import PiecewisePolynomial
 from limit_surface_ros.decay.delay.roots import first_roots
+from limit_surface_ros.decay.examples import example, thesis_system
 from limit_surface_ros.decay.targets import PiecewiseLinear, uniform_times
 from limit_surface_ros.plots.canvas import BLACK, BLUE, SKY, VERMILION, new_figure
 from limit_surface_ros.thesis.findings import Claim, Findings, Study
@@ -23,9 +24,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.decay.exponential_sum import Complexes
     from limit_surface_ros.decay.delay.impulses import Impulses
     from limit_surface_ros.decay.delay.kernel import MemoryKernel
+    from limit_surface_ros.decay.exponential_sum import Complexes
     from limit_surface_ros.thesis.findings import Table
     from limit_surface_ros.thesis.settings import Settings
     from limit_surface_ros.thesis.store import Store

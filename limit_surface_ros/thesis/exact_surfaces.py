@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figures 3.1 to 3.5: the exact limit surfaces of simple bodies, and the two sliders."""
 
 from __future__ import annotations
@@ -8,19 +9,19 @@ import numpy as np
 
 from limit_surface_ros.plots.canvas import BLACK, BLUE, GREY, SKY, VERMILION, new_figure
 from limit_surface_ros.plots.surface_view import draw_solid, style_solid
+from limit_surface_ros.surface.sampling import facet_loads, random_motions
 from limit_surface_ros.thesis import bodies
 from limit_surface_ros.thesis.findings import Claim, Findings, Study
-from limit_surface_ros.surface.sampling import facet_loads, random_motions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+    from limit_surface_ros.surface.pairs import Pairs
     from limit_surface_ros.thesis.findings import Table
     from limit_surface_ros.thesis.settings import Settings
     from limit_surface_ros.thesis.store import Store
-    from limit_surface_ros.surface.pairs import Pairs
-    from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 
 # How far inside a supporting plane a load may seem to lie by rounding.
 _ON_PLANE = 1e-12

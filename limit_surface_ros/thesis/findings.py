@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the study of one figure gives: numbers, claims that were checked, and pictures."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The fits of chapter 3 and those beyond it: which body, which family, which objective."""
 
 from __future__ import annotations
@@ -10,24 +11,24 @@ import numpy as np
 
 from limit_surface_ros.files.surface_file import SurfaceModel
 from limit_surface_ros.fitting.dissipation import fit_dissipation
-from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.polynomial import fit_polynomial
 from limit_surface_ros.fitting.power_sum import fit_power_sum
+from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.second_approximation import fit_second_approximation
-from limit_surface_ros.thesis import bodies
-from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.kinds.power_sum import thesis_exponents
+from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.sampling import facet_loads, random_motions
 from limit_surface_ros.surface.scaling import Scaling
+from limit_surface_ros.thesis import bodies
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from limit_surface_ros.fitting.result import FitResult
-    from limit_surface_ros.thesis.settings import Settings
-    from limit_surface_ros.thesis.store import Store
     from limit_surface_ros.surface.kinds.point_contacts import PointContacts
     from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.thesis.settings import Settings
+    from limit_surface_ros.thesis.store import Store
 
 # By name: the body, and whether its facets are large enough to be sampled.
 BODIES: dict[str, tuple[Callable[[], PointContacts], bool]] = {

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figures 2.8 to 2.16: two more functions, and every function on every basis."""
 
 from __future__ import annotations
@@ -9,8 +10,8 @@ import numpy as np
 
 from limit_surface_ros.decay.coefficients import fit_coefficients
 from limit_surface_ros.decay.delay.construction import delay_system
-from limit_surface_ros.decay.examples import example, simple_system, thesis_system
 from limit_surface_ros.decay.delay.roots import first_roots
+from limit_surface_ros.decay.examples import example, simple_system, thesis_system
 from limit_surface_ros.plots.canvas import BLUE, line_style, new_figure
 from limit_surface_ros.thesis.decay_system import (
     MAX_DELAY,

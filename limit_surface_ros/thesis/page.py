@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One page that shows every figure: it needs no other file, no network and no wide screen."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Carry out the studies of all figures, one by one, and write the page that shows them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How much work goes into the figures."""
 
 from __future__ import annotations

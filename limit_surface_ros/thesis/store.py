@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What has been worked out stays on disk, keyed by its parameters: a run can be resumed."""
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ from limit_surface_ros.files.surface_file import (
 )
 from limit_surface_ros.files.yaml_reader import plain
 from limit_surface_ros.plots.canvas import save_figure
-from limit_surface_ros.thesis.findings import Claim
 from limit_surface_ros.surface.convexity import NotConvexWarning
+from limit_surface_ros.thesis.findings import Claim
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

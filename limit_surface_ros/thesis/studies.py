@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """All figures that are rebuilt, in the thesis's order."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figures 3.9 to 3.12: how far the fits are off, on clean and on noisy data."""
 
 from __future__ import annotations
@@ -16,8 +17,6 @@ from limit_surface_ros.plots.canvas import (
     VERMILION,
     new_figure,
 )
-from limit_surface_ros.thesis.findings import Claim, Findings, Study
-from limit_surface_ros.thesis.fits import Fit, body_of, fitted, test_pairs
 from limit_surface_ros.surface.convexity import is_convex
 from limit_surface_ros.surface.measures import (
     empirical_distribution,
@@ -26,6 +25,8 @@ from limit_surface_ros.surface.measures import (
     velocity_error,
 )
 from limit_surface_ros.surface.sampling import random_directions
+from limit_surface_ros.thesis.findings import Claim, Findings, Study
+from limit_surface_ros.thesis.fits import Fit, body_of, fitted, test_pairs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

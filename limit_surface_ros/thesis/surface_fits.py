@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figures 3.6 to 3.8: fitted surfaces with the loads that they were fitted to."""
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.protocol import LimitSurface
     from limit_surface_ros.thesis.findings import Table
     from limit_surface_ros.thesis.settings import Settings
     from limit_surface_ros.thesis.store import Store
-    from limit_surface_ros.surface.protocol import LimitSurface
 
 TERMS = ("thesis1", "thesis2", "thesis3")
 BEYOND = ("norms3", "norms4")

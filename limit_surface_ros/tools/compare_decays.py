@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compare methods of approximating a decaying response, each with several numbers of terms.
 
 Prints one row for each method and number of terms: the error on the fitted interval and beyond

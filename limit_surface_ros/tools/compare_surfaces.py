@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compare surfaces on data: model files, and kinds that are fitted on the spot.
 
 Prints one row for each: its size, the quantiles of the error of motion |v - v^| of unit twists,
@@ -23,17 +24,17 @@ from limit_surface_ros.checks import counted
 from limit_surface_ros.errors import DataError, LimitSurfaceError, RangeError
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.fitting.few_pushes.uncertainty import surfaces_of, twist_spread
-from limit_surface_ros.fitting.search import Search, process_pool
-from limit_surface_ros.fitting.result import errors_on
 from limit_surface_ros.fitting.pairs import scaling_of_pairs
+from limit_surface_ros.fitting.result import errors_on
+from limit_surface_ros.fitting.search import Search, process_pool
 from limit_surface_ros.fitting.workers import available_cores
 from limit_surface_ros.plots.canvas import SUFFIXES, new_figure, save_figure
 from limit_surface_ros.plots.distributions import draw_distributions
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
-from limit_surface_ros.surface.measures import load_error, quantiles, velocity_error
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.kinds.polynomial import Polynomial
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
+from limit_surface_ros.surface.measures import load_error, quantiles, velocity_error
 from limit_surface_ros.tools.fit_options import OF_AUTO
 from limit_surface_ros.tools.given_options import named_path, refuse_unused
 from limit_surface_ros.tools.output_file import check_output

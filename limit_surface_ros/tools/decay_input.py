@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The response that a decay program is to approximate: an example or a record."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where the fits of a catalogue run: processes of this machine, or a running Dask cluster."""
 
 from __future__ import annotations

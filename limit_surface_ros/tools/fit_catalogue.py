@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fit a limit surface to each contact or recording in a folder, and write one model for each.
 
 A run that is interrupted, or killed, goes on where it was when the same command is given again:

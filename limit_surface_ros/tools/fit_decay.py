@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Approximate a decaying response by a sum of exponentials, and write it as a decay model.
 
 The rates come from the response's own delay differential equation (method dde), from closed

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Which options of a fit count for which inputs and kinds of fit; the others are refused."""
 
 from __future__ import annotations

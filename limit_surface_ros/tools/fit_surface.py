@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fit a limit surface to a contact or to recorded pushes, and write it as a model file."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a program may write, looked at before the work: suffix, folder, and not its own input."""
 
 from __future__ import annotations

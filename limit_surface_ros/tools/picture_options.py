@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The options of a program that draws one picture, and the checks of them before the work."""
 
 from __future__ import annotations

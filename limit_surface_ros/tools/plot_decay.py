@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Draw a decay model: response and fit, error, rates in the complex plane, projection."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the command line programs share: errors and warnings as one line, quiet interrupts."""
 
 from __future__ import annotations

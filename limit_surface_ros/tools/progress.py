@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Progress of long work on a terminal, by tqdm where it is installed (extra `progress`)."""
 
 from __future__ import annotations

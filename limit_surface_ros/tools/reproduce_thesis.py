@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rebuild the figures of the thesis's chapters 2 and 3 from scratch, and what lies beyond them."""
 
 from __future__ import annotations

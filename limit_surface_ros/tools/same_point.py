@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Surfaces and data can be compared only where they are about one point of one frame."""
 
 from __future__ import annotations

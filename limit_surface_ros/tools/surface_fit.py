@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What fit_surface and fit_catalogue share: the options of a fit, and the fit of one input."""
 
 from __future__ import annotations
@@ -12,12 +13,12 @@ from limit_surface_ros import __version__
 from limit_surface_ros.errors import DataError, RangeError
 from limit_surface_ros.files.bag_pushes import Selection
 from limit_surface_ros.files.surface_file import LARGEST_SCALE, SurfaceModel
-from limit_surface_ros.fitting.few_pushes.automatic import fit_automatically
 from limit_surface_ros.fitting.dissipation import FITTED_ON, fit_dissipation
-from limit_surface_ros.fitting.search import Search
+from limit_surface_ros.fitting.few_pushes.automatic import fit_automatically
+from limit_surface_ros.fitting.pairs import scaling_of_pairs
 from limit_surface_ros.fitting.polynomial import fit_polynomial
 from limit_surface_ros.fitting.power_sum import fit_power_sum
-from limit_surface_ros.fitting.pairs import scaling_of_pairs
+from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.second_approximation import fit_second_approximation
 from limit_surface_ros.surface.kinds.power_sum import thesis_exponents
 from limit_surface_ros.tools.given_options import check_ranges
@@ -39,8 +40,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.fitting.search import Progress
     from limit_surface_ros.fitting.result import FitResult
+    from limit_surface_ros.fitting.search import Progress
     from limit_surface_ros.surface.kinds.point_contacts import PointContacts
     from limit_surface_ros.surface.scaling import Scaling
     from limit_surface_ros.tools.training_data import TrainingData

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a program fits or compares surfaces on: pairs, and what is known about them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Set up ROS 2 Jazzy and this workspace as far as needed, then run a command in it.
 
 A sourced Jazzy is used as it is. Without one, ROS comes as wheels into `.venv`. Both packages are

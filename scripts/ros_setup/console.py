@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the set-up tells its user, and commands whose noise goes to a log."""
 
 import os

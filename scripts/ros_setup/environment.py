@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The environment that programs of the workspace run in, whatever the user's shell holds."""
 
 import os

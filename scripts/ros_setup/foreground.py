@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Run a program that people end with Ctrl-C, without `make` taking the key for itself."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What must be there before anything is installed, each with the sentence that says it is not."""
 
 import importlib.util

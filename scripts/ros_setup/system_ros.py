@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A ROS 2 Jazzy that is sourced: what it must hold, and what it fixes."""
 
 import shutil

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The virtual environment `.venv`: made, filled, mended, and remade when it does not fit."""
 
 import hashlib

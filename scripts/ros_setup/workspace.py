@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The two packages of this repository, built by colcon when their sources changed."""
 
 import hashlib

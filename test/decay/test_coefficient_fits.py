@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Coefficients are optimal in the norm asked for, and a dual bound proves it."""
 
 import numpy as np
@@ -9,12 +10,12 @@ from scipy.optimize import linprog
 from limit_surface_ros.decay import examples
 from limit_surface_ros.decay.coefficients import fit_coefficients
 from limit_surface_ros.decay.delay.construction import system_of_kernel
-from limit_surface_ros.decay.exponential_sum import real_basis
 from limit_surface_ros.decay.delay.impulses import find_impulses
 from limit_surface_ros.decay.delay.kernel import memory_kernel
+from limit_surface_ros.decay.delay.roots import first_roots
+from limit_surface_ros.decay.exponential_sum import real_basis
 from limit_surface_ros.decay.minimax import solve_minimax
 from limit_surface_ros.decay.response_fits import fit_response, largest_error
-from limit_surface_ros.decay.delay.roots import first_roots
 from limit_surface_ros.errors import RangeError, ShapeError
 
 seeds = st.integers(min_value=0, max_value=2**32 - 1)

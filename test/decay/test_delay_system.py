@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Delay systems evaluate their characteristic function without a singularity, however given."""
 
 import numpy as np
@@ -6,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from limit_surface_ros.decay.delay.system import DelaySystem, from_quasi_polynomial
 from limit_surface_ros.decay.delay.pieces import PiecewisePolynomial
+from limit_surface_ros.decay.delay.system import DelaySystem, from_quasi_polynomial
 from limit_surface_ros.errors import DataError, RangeError, ShapeError
 
 seeds = st.integers(min_value=0, max_value=2**32 - 1)

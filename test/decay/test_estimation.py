@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Samples correct a model's coefficients, and nothing that comes in can spoil them for good."""
 
 import math

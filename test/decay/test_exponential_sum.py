@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sums of exponentials evaluate, differentiate, integrate and cross levels as they promise."""
 
 import math

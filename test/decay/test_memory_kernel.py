@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The memory kernel is found to the last digit, its impulses too, and bad records are refused."""
 
 from decimal import Decimal, localcontext

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A response is scaled to its onset, corrected in fractions of it, and says how sure it is."""
 
 import math

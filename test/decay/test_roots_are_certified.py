@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """All roots in a box are found, none twice, and the argument principle vouches for it."""
 
 import warnings
@@ -8,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import lambertw
 
-from limit_surface_ros.decay import examples, roots
+from limit_surface_ros.decay import examples
+from limit_surface_ros.decay.delay import roots
 from limit_surface_ros.decay.delay.construction import delay_system
-from limit_surface_ros.decay.delay.system import DelaySystem
 from limit_surface_ros.decay.delay.pieces import PiecewisePolynomial
 from limit_surface_ros.decay.delay.roots import (
     count_roots,
@@ -24,6 +25,7 @@ from limit_surface_ros.decay.delay.stability import (
     require_minimum_phase,
     require_stable,
 )
+from limit_surface_ros.decay.delay.system import DelaySystem
 from limit_surface_ros.errors import DataError, RangeError, SolverError, UnstableError
 
 THESIS_BOX = ((-6.0, 3.0), (0.0, 68.0))

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A pushed body rests from the last time on at which its load factor is above 1."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Stands in for the commands of ros2cli that the documentation uses, where it is absent.
 
 It runs the real programs and calls the real services and topics, with what the page says. What

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The promise of README and docs: every code block runs, in order, as it stands.
 
 A page's blocks run in a folder of their own. Python runs as one program; a page that also holds

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The promise of examples/: short, and they run (C++: compiles) as they stand."""
 
 from __future__ import annotations

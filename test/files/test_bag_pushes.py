@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pushes are found in real bags of both storages, and what is dropped is counted."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Contact files: every description is read, and what is wrong is named."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A decay model written and read back is the same, and a bad file says what is wrong with it."""
 
 import re
@@ -9,9 +10,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from limit_surface_ros.decay.delay.pieces import PiecewisePolynomial
 from limit_surface_ros.decay.delay.system import DelaySystem
 from limit_surface_ros.decay.exponential_sum import ExponentialSum
-from limit_surface_ros.decay.delay.pieces import PiecewisePolynomial
 from limit_surface_ros.errors import FileError, RangeError
 from limit_surface_ros.files.decay_file import DecayModel, read_decay_model, write_decay_model
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The decay models that the package ships can be read and are what their names say."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A set of models is read whole or not at all, and finds models by name."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recorded pushes are read whole, and every fault is named with file and line."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A surface model written and read back is the same; a file that is not one says why."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files read through `Section` give clean values or say file, key, fault and what is accepted."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """BFGS reaches minima, and goes on from a known curvature."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Jobs of a catalogue: a bad one fails alone, whatever it does, and every other one is done."""
 
 import functools

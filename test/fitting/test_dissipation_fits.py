@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Dissipation models are fitted on forces and on directions, with exact gradients."""
 
 import numpy as np
@@ -12,13 +13,13 @@ from limit_surface_ros.fitting.dissipation_direction_objective import (
     DissipationDirectionObjective,
 )
 from limit_surface_ros.fitting.dissipation_force_objective import DissipationForceObjective
-from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.pairs import scale_pairs
+from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.smooth_inverse import SmoothInverse
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.measures import load_error, velocity_error
 from limit_surface_ros.surface.pairs import Pairs
-from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.sampling import facet_loads, random_loads, random_motions
 from limit_surface_ros.surface.scaling import Scaling
 

@@ -1,17 +1,18 @@
+# SPDX-License-Identifier: Apache-2.0
 """No fit depends on the units of its data, collapses, or leaves the positive semidefinite cone."""
 
 import numpy as np
 import pytest
 
 from limit_surface_ros.fitting.dissipation import fit_dissipation
-from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.polynomial import fit_polynomial
 from limit_surface_ros.fitting.power_sum import fit_power_sum
+from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.second_approximation import fit_second_approximation
 from limit_surface_ros.fitting.simulation import simulated_pairs
-from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.kinds.power_sum import thesis_exponents
+from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.scaling import Scaling
 
 TRIANGLE = PointContacts(

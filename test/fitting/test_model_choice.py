@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Few, noisy pushes: held and chosen fits keep their promises."""
 
 import numpy as np
@@ -5,20 +6,20 @@ import pytest
 
 from limit_surface_ros.errors import DataError, RangeError
 from limit_surface_ros.fitting.few_pushes.automatic import fit_automatically
+from limit_surface_ros.fitting.few_pushes.cross_validation import choose_recipe, default_candidates
+from limit_surface_ros.fitting.few_pushes.recipe import Recipe, Workbench
 from limit_surface_ros.fitting.few_pushes.uncertainty import (
     bootstrap,
     stored_surfaces,
     surfaces_of,
     twist_spread,
 )
-from limit_surface_ros.fitting.few_pushes.cross_validation import choose_recipe, default_candidates
 from limit_surface_ros.fitting.search import Search
-from limit_surface_ros.fitting.few_pushes.recipe import Recipe, Workbench
 from limit_surface_ros.surface.convexity import is_convex
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.measures import mean_angle
 from limit_surface_ros.surface.pairs import Pairs
-from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.sampling import random_loads
 from limit_surface_ros.surface.scaling import Scaling
 

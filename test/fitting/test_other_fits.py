@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Polynomials and the second approximation: exact where they can be, convex where they must be."""
 
 import numpy as np
@@ -5,11 +6,11 @@ import pytest
 
 from limit_surface_ros.errors import DataError, RangeError
 from limit_surface_ros.fitting.cholesky import factors_of_matrices, parameters_of
-from limit_surface_ros.fitting.search import Search
+from limit_surface_ros.fitting.pairs import scale_pairs
 from limit_surface_ros.fitting.polynomial import fit_polynomial
 from limit_surface_ros.fitting.power_sum import fit_power_sum
 from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
-from limit_surface_ros.fitting.pairs import scale_pairs
+from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.second_approximation import (
     SecondObjective,
     fit_second_approximation,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fits of power sums reach the known minima and do not depend on units or workers."""
 
 import numpy as np
@@ -6,15 +7,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from limit_surface_ros.errors import DataError, RangeError
-from limit_surface_ros.fitting.search import Search, descents, process_pool
+from limit_surface_ros.fitting.pairs import ScaledPairs, scale_pairs
 from limit_surface_ros.fitting.power_sum import fit_power_sum
 from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
-from limit_surface_ros.fitting.pairs import ScaledPairs, scale_pairs
+from limit_surface_ros.fitting.search import Search, descents, process_pool
 from limit_surface_ros.fitting.simulation import simulated_pairs
-from limit_surface_ros.surface.measures import quantiles, velocity_error
-from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.kinds.power_sum import PowerSum, thesis_exponents
+from limit_surface_ros.surface.measures import quantiles, velocity_error
+from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.sampling import facet_loads, random_loads, random_motions
 from limit_surface_ros.surface.scaling import Scaling
 

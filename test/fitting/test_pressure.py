@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where a body presses on the ground, found from its pushes alone."""
 
 import numpy as np
@@ -6,12 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from limit_surface_ros.fitting.few_pushes.pressure import PressureObjective, fit_pressure
-from limit_surface_ros.fitting.pairs import ScaledPairs, scale_pairs
 from limit_surface_ros.fitting.few_pushes.small_contacts import SmallContacts
+from limit_surface_ros.fitting.pairs import ScaledPairs, scale_pairs
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.measures import mean_angle
 from limit_surface_ros.surface.pairs import Pairs
-from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.sampling import random_loads
 from limit_surface_ros.surface.scaling import Scaling
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An interrupt ends a pool of processes at once, whatever its tasks are and whatever they hold."""
 
 import os

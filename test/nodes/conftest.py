@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Real nodes in this process, spun in a thread; tests wait on what happens, never on time."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Many loads or motions in one call: the library's answers, or the first bad row."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Whatever comes in, the decay node answers with a code and goes on."""
 
 from __future__ import annotations

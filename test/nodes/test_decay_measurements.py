@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measurements correct the decay node's forecast; bad ones are refused and spoil nothing."""
 
 from __future__ import annotations

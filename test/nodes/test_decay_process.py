@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The decay program and the program with both nodes: start, stream in wall time, end cleanly."""
 
 from __future__ import annotations

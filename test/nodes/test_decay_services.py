@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The services of the decay node answer as the library does, or say why not."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The decay node publishes a falling wrench in node time, whatever the clock does."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The demonstration: a table, exit code 0, no process left behind."""
 
 from __future__ import annotations

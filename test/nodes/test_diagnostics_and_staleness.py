@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Diagnostics tell what the node sees: counts, ages, stale inputs, mismatched peers."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Each error of the package has one code, and each code of the interfaces a meaning."""
 
 from __future__ import annotations

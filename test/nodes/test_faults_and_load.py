@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Whatever is sent, each service answers with a code and no input ends or fills the node."""
 
 from __future__ import annotations

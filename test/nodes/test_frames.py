@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Inputs in other frames are transformed with the lever arm, or refused with both frames named."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Launch files in Python and XML declare the same arguments and start programs that exist.
 
 `launch` is not on the Python package index: where it is absent, the files are read as text.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The limit_surface program: starts, serves other processes, and ends without a traceback."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The topics of the limit_surface node: each good input is answered, with its stamp."""
 
 from __future__ import annotations

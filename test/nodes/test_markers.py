@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The promise of `nodes.markers`: what RViz shows is where the mathematics says it is."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Models are read all or none and swapped in one step; the old ones serve until then."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The parameter files in config/ show each parameter at its default."""
 
 from __future__ import annotations

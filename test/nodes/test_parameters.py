@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parameters: described, validated when set, applied afterwards, all or none."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The push service answers as the library's push does, in any known frame."""
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from geometry_msgs.msg import Point, Vector3
 from limit_surface_interfaces.msg import ErrorCode
 from limit_surface_interfaces.srv import Push
 
-from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
 from limit_surface_ros.motion.push import ContactMode, push
+from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
 from node_helpers import STAMP, planar_twist, planar_wrench
 
 YAW = 0.5

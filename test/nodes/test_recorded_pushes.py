@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The main job end to end: recorded pushes, a fitted model in YAML, the node, its answers."""
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from limit_surface_interfaces.srv import WrenchToTwist
 
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
-from limit_surface_ros.fitting.search import Search
-from limit_surface_ros.fitting.power_sum import fit_power_sum
 from limit_surface_ros.fitting.pairs import scaling_of_pairs
+from limit_surface_ros.fitting.power_sum import fit_power_sum
+from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.surface.kinds.power_sum import thesis_exponents
 from node_helpers import Program, planar_twist, wrench_message
 

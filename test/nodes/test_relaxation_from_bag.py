@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """From a bag of a measured force relaxation to a decay node that predicts the next one."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Stamps of a stream neither drift nor repeat, however late or coarsely time comes in."""
 
 from hypothesis import given, settings

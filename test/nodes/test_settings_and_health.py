@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The ROS-free parts of the nodes: settings refuse what they should, health counts."""
 
 from __future__ import annotations

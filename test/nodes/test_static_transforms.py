@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Static transforms of the parameter: parsed, chained, and refused with what is accepted."""
 
 from __future__ import annotations

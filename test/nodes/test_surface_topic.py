@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The promise of ~/surface: shown to whoever looks, up to date, and not made for nobody."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The promises of `plots.canvas`: the same files each time, whole files, no global state."""
 
 import sys

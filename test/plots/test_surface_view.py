@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The promises of `plots.surface_view`: what is drawn lies on the surface, in its units."""
 
 import numpy as np

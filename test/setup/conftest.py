@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Ways to run the set-up program in a doctored environment."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Within `scripts/with_ros bash`, `make` finds the Python and the ROS that it finds outside."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a shell holds does not mislead the programs of the workspace."""
 
 from __future__ import annotations

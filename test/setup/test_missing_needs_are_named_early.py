@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The set-up stops before it installs anything, with one sentence on what is missing."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Stamps tell what is up to date: sources, place and Python."""
 
 from __future__ import annotations

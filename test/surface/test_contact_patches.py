@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shapes have their area and centre, pressures their centre, patches the loads known for them."""
 
 import tracemalloc
@@ -6,7 +7,8 @@ import numpy as np
 import pytest
 
 from limit_surface_ros.errors import GeometryError, RangeError, ShapeError
-from limit_surface_ros.surface import pressure, sampling, shapes
+from limit_surface_ros.surface import sampling
+from limit_surface_ros.surface.contact import pressure, shapes
 from limit_surface_ros.surface.contact.patch import ContactPatch, natural_scaling
 
 L_SHAPE = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]

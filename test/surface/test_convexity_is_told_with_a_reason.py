@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Convexity: theorems where they hold, counter-examples that can be checked, one warning."""
 
 import warnings

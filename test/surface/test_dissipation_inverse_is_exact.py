@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The twist of a load is the one of most power for its dissipation, on facets and edges too."""
 
 import numpy as np

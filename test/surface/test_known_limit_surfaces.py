@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Limit surfaces that Goyal, Ruina and Papadopoulos (1991) and mechanics give in closed form."""
 
 import numpy as np

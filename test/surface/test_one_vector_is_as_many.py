@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A single vector takes a lean path, which must tell the same and refuse the same as the batch."""
 
 import pickle

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Homogeneous polynomials of fourth order: maps, derivatives and what is refused."""
 
 import numpy as np

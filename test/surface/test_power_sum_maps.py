@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sums of powers: their scale, their normals and their loads of maximum dissipation."""
 
 import numpy as np

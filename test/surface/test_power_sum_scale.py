@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Load factors of sums of powers are alike by polynomials and by logarithms, and solve H = 1."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A push obeys the quasi-static conditions, and agrees with brute force over all motions."""
 
 import numpy as np
@@ -6,13 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from limit_surface_ros.errors import RangeError, ShapeError, ZeroVectorError
+from limit_surface_ros.motion.push import ContactMode, motion_cone, push
 from limit_surface_ros.surface.contact.patch import ContactPatch
+from limit_surface_ros.surface.contact.shapes import rectangle
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
-from limit_surface_ros.motion.push import ContactMode, motion_cone, push
 from limit_surface_ros.surface.scaling import Scaling
-from limit_surface_ros.surface.contact.shapes import rectangle
 
 seeds = st.integers(0, 2**32 - 1)
 SQUARE = ContactPatch.of_shape(rectangle([0.1, 0.1], 100)).surface(0.3, 10.0)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pairs drawn from a surface lie on it, and the measures of error measure what they say."""
 
 import numpy as np
@@ -5,9 +6,9 @@ import pytest
 
 from limit_surface_ros.errors import DataError, RangeError
 from limit_surface_ros.surface import measures, sampling
-from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
+from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.scaling import Scaling
 
 TRIANGLE = np.array([[-40, -40], [-40, 80], [80, -40]]) / 150

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Batches that pay for a table are answered from it, as exactly as one by one."""
 
 import warnings

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The promise of Figures 2.1 to 2.16: the thesis's own numbers, to the digit, and its claims."""
 
 import numpy as np

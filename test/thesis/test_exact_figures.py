@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The promise of Figures 3.1 to 3.5: what the text says of them holds."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The promise of the page: a browser shows all of it, at the width of a phone, without network."""
 
 import html

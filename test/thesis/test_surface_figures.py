@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The promise of Figures 3.6 to 3.12: fits made once, errors measured afresh, claims judged."""
 
 import csv

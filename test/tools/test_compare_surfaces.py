@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """compare_surfaces: one table of models and kinds, pictures, and clear refusals."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """fit_catalogue: every object that can be fitted is, once; a run that ends early goes on."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """fit_catalogue --dask: a real scheduler and two workers in processes of their own."""
 
 import signal

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """fit_decay and compare_decays: from an example or a record to a model file and a table."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """fit_surface: from data to a model file, or one clear line and no file."""
 
 import json
@@ -15,8 +16,8 @@ from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.fitting.few_pushes.uncertainty import surfaces_of
 from limit_surface_ros.fitting.result import Errors, FitResult
-from limit_surface_ros.surface.measures import mean_angle
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+from limit_surface_ros.surface.measures import mean_angle
 from limit_surface_ros.surface.sampling import random_motions
 from limit_surface_ros.surface.scaling import Scaling
 from limit_surface_ros.tools.fit_surface import main, starts_in_words

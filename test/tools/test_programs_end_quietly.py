@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A program whose output goes nowhere ends without a traceback."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The promises of plot_surface, plot_decay and reproduce_thesis as programs."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The memory kernel of a piecewise linear response in closed form.
 
 With x(0) = x0, first slope s0 and slope jumps J_k at a_k, and beta = -s0 / x0, the Laplace

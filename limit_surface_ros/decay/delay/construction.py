@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """From a response to the delay system that has it as a solution: thesis 2.1 to 2.3 in one call."""
 
 from __future__ import annotations
@@ -9,10 +10,10 @@ import numpy as np
 
 from limit_surface_ros.checks import as_positive
 from limit_surface_ros.decay.delay.closed_kernel import ClosedKernel
-from limit_surface_ros.decay.delay.system import DelaySystem
 from limit_surface_ros.decay.delay.impulses import find_impulses
 from limit_surface_ros.decay.delay.kernel import memory_kernel
 from limit_surface_ros.decay.delay.pieces import PiecewisePolynomial
+from limit_surface_ros.decay.delay.system import DelaySystem
 from limit_surface_ros.decay.targets import PiecewiseLinear, uniform_times
 from limit_surface_ros.errors import DataError, RangeError
 

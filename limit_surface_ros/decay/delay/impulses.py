@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Impulses in a sampled memory kernel: discrete delays and their strengths.
 
 A kink of the response puts an impulse into its kernel, which rises as 1 / step when the samples

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The memory kernel f of a response: xdot(t) = int_0^t f(tau) x(t - tau) dtau (thesis 2.1).
 
 With forward differences the samples obey a lower-triangular Toeplitz system, that is, f is the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Piecewise polynomials on [0, T]: the distributed part of a memory kernel.
 
 Each cell holds a Legendre series. Its transform is integrated by Gauss-Legendre quadrature, which

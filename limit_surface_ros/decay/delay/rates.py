@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rates of the thesis: characteristic roots of the delay system built from the response.
 
 The maximum delay T is the one choice that matters. Short delays put the roots far apart, and the
@@ -12,10 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.decay.delay.construction import delay_system
-from limit_surface_ros.decay.rate_choice import RateChoice, judged, take
 from limit_surface_ros.decay.delay.roots import first_roots, roots_in_box
-from limit_surface_ros.decay.smoothing import settling_time, smoothed
 from limit_surface_ros.decay.delay.stability import require_minimum_phase, require_stable
+from limit_surface_ros.decay.rate_choice import RateChoice, judged, take
+from limit_surface_ros.decay.smoothing import settling_time, smoothed
 from limit_surface_ros.errors import DataError, RangeError, SolverError, UnstableError
 
 if TYPE_CHECKING:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Characteristic roots of a delay system, certified by the argument principle.
 
 Seeds are the cells of a grid around which the phase of the characteristic function turns;

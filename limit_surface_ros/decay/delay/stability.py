@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Certificates of stability: of a delay system, and of the system a response would give."""
 
 from __future__ import annotations
@@ -8,8 +9,8 @@ import numpy as np
 
 from limit_surface_ros.checks import as_positive
 from limit_surface_ros.decay.delay.roots import count_roots
-from limit_surface_ros.decay.targets import PiecewiseLinear
 from limit_surface_ros.decay.delay.winding import turn
+from limit_surface_ros.decay.targets import PiecewiseLinear
 from limit_surface_ros.errors import DataError, SolverError, UnstableError
 
 if TYPE_CHECKING:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Linear delay differential equations: xdot(t) = sum_j c_j x(t - tau_j) + int p(tau) x(t - tau).
 
 Inserting x = exp(lambda t) gives the characteristic function

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The argument principle: how many zeros an analytic function has inside a closed path.
 
 A real function (h(conj z) = conj h(z)) needs only the upper half of a path that is symmetric about

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The fit that asks for no choice: a recipe by cross-validation, refitted on all pushes."""
 
 from __future__ import annotations
@@ -7,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limit_surface_ros.fitting.few_pushes.uncertainty import bootstrap, stored_surfaces
 from limit_surface_ros.fitting.few_pushes.cross_validation import choose_recipe
-from limit_surface_ros.fitting.search import Search
+from limit_surface_ros.fitting.few_pushes.uncertainty import bootstrap, stored_surfaces
 from limit_surface_ros.fitting.result import FitResult, errors_on
+from limit_surface_ros.fitting.search import Search
 
 if TYPE_CHECKING:
     from limit_surface_ros.fitting.search import Progress
-    from limit_surface_ros.surface.pairs import Pairs
     from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+    from limit_surface_ros.surface.pairs import Pairs
     from limit_surface_ros.surface.scaling import Scaling
 
 

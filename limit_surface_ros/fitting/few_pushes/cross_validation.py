@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Which recipe for few, noisy pushes: k-fold cross-validation, then a refit on all of them.
 
 A careless choice loses more than it gains: with two dozen pushes the best of many recipes on
@@ -14,7 +15,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.errors import DataError, LimitSurfaceError, RangeError
-from limit_surface_ros.fitting.few_pushes.recipe import FEWEST_PAIRS, Recipe, Workbench, check_pushes
+from limit_surface_ros.fitting.few_pushes.recipe import (
+    FEWEST_PAIRS,
+    Recipe,
+    Workbench,
+    check_pushes,
+)
 from limit_surface_ros.fitting.pairs import scale_pairs
 from limit_surface_ros.surface.measures import angle_error
 from limit_surface_ros.surface.pairs import Pairs

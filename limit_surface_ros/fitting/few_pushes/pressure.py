@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where a body presses on the ground, from recorded pushes: friction limits of many contacts.
 
     J = (motion_cost) + strength sum_k (m_k log(m_k / n_k) - m_k + n_k)
@@ -15,8 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.fitting.bfgs import minimise
-from limit_surface_ros.fitting.motion_cost import MotionCost
 from limit_surface_ros.fitting.few_pushes.small_contacts import SmallContacts
+from limit_surface_ros.fitting.motion_cost import MotionCost
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats

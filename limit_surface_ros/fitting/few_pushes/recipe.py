@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How to fit few, noisy pushes: kind, terms, weight, and what the fit is held towards.
 
 Two means keep a fit of many parameters to few pushes from following their errors: the error of
@@ -27,19 +28,19 @@ from limit_surface_ros.fitting.dissipation_direction_objective import (
     DissipationDirectionObjective,
 )
 from limit_surface_ros.fitting.dissipation_parameters import floored_parameters
-from limit_surface_ros.fitting.search import descend_from_seed
-from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
 from limit_surface_ros.fitting.few_pushes.pressure import fit_pressure
-from limit_surface_ros.fitting.pairs import ScaledPairs, check_support, scale_pairs
 from limit_surface_ros.fitting.few_pushes.small_contacts import SmallContacts
+from limit_surface_ros.fitting.pairs import ScaledPairs, check_support, scale_pairs
+from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
+from limit_surface_ros.fitting.search import descend_from_seed
 from limit_surface_ros.fitting.solve import is_sound
 from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.sampling import random_loads
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.fitting.search import Descent
     from limit_surface_ros.fitting.objective import Objective
+    from limit_surface_ros.fitting.search import Descent
     from limit_surface_ros.surface.kinds.point_contacts import PointContacts
     from limit_surface_ros.surface.protocol import LimitSurface
     from limit_surface_ros.surface.scaling import Scaling

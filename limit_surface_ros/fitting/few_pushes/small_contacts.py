@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Small contacts: the support points that a fit chooses from, and the few it is summed up in.
 
 A contact at (x, y) of friction limit m and radius c makes the term m sqrt(wx^2 + wy^2 + (c w)^2),

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How far recorded pushes leave a predicted twist open: refits with random weights of the pushes.
 
 The Bayesian bootstrap (Rubin 1981, doi:10.1214/aos/1176345338) draws each push's weight from an
@@ -23,10 +24,10 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.fitting.search import Progress
     from limit_surface_ros.fitting.few_pushes.recipe import Recipe
-    from limit_surface_ros.surface.pairs import Pairs
+    from limit_surface_ros.fitting.search import Progress
     from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+    from limit_surface_ros.surface.pairs import Pairs
     from limit_surface_ros.surface.protocol import LimitSurface
     from limit_surface_ros.surface.scaling import Scaling
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Contact patches: shape and pressure, apart from the weight and the friction that scale them."""
 
 from __future__ import annotations
@@ -9,8 +10,8 @@ import numpy as np
 
 from limit_surface_ros.checks import as_floats, as_positive
 from limit_surface_ros.errors import GeometryError, RangeError, ShapeError
-from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.contact.pressure import uniform
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.scaling import Scaling
 
 if TYPE_CHECKING:

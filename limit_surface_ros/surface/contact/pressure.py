@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pressure distributions: how a body's weight spreads over its contact.
 
 A distribution is any function of `Cells` that returns relative pressures, shape (n,); only their

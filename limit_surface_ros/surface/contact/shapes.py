@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shapes of contact as cells: points with areas, by which integrals over the shape become sums.
 
 Every function returns `Cells` of about `count` cells, each with its centroid and its area (for a

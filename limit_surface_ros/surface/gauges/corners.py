@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Corners of a surface, where many normals meet, and the nearest one to a given normal."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The dissipation D(v) of a sliding body as a sum of norms, with its derivatives and facets.
 
 Both the sums of quadratic-form norms and support points speak this one language to

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Power sums for a single load, in plain floats: numpy's overhead on three numbers is the cost.
 
 The same arithmetic as in `power_sum`, to the same rounding. A load that needs care (a term or all

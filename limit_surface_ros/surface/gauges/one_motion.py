@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The motion under a single load for a sum of few norms, in plain floats.
 
 The twin of `gauge_inverse.ConvexInverse` with the same corners and the same starts. What does not
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.support.solvers import ConvexInverse
     from limit_surface_ros.surface.gauges.one_load import Vector
+    from limit_surface_ros.surface.support.solvers import ConvexInverse
 
 # Power below which a load is as good as across a corner's motion.
 _ACROSS = 1e-9

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The gauge of a power sum for a single load, in plain floats; see `one_twist`."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A homogeneous polynomial of fourth order for a single load, in plain floats; see `one_twist`."""
 
 from __future__ import annotations

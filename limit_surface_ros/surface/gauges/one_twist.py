@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The load of most power for a single twist, in plain floats.
 
 Newton's method as in `plane_minimum`. Whatever does not go smoothly is left to that module: the
@@ -15,9 +16,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from typing import TypeAlias
 
-    from limit_surface_ros.surface.support.solvers import Inverse
     from limit_surface_ros.surface.gauges.one_load import Vector
     from limit_surface_ros.surface.scaling import Scaling
+    from limit_surface_ros.surface.support.solvers import Inverse
 
     # Height, gradient and Newton's move at a place in a plane.
     Newton: TypeAlias = tuple[float, tuple[float, float], tuple[float, float]]

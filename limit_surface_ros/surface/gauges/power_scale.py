@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The load factor g of a sum of powers, sum_i (q_i / g^2)^p_i = 1, and how each form weighs.
 
 With h_i = (q_i / g^2)^p_i the outward normal is the sum of the A_i f, weighed by p_i h_i / q_i.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The load factor of a sum of powers as a gauge, with its derivatives."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Dissipation models: D(v) = sum_k sqrt(v' B_k v), with the wrench its gradient."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Surfaces given by their dissipation D(v), a sum of norms: loads in closed form, twists exact."""
 
 from __future__ import annotations
@@ -9,20 +10,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limit_surface_ros.surface.base import ScaledSurface
 from limit_surface_ros.surface.gauges.norm_sum import FormTerms
-from limit_surface_ros.surface.support.solvers import ConvexInverse
 from limit_surface_ros.surface.gauges.one_load import norm_gradient_of_one, one_load_terms
 from limit_surface_ros.surface.gauges.one_motion import OneMotion
 from limit_surface_ros.surface.linalg import root_of
-from limit_surface_ros.surface.base import ScaledSurface
 from limit_surface_ros.surface.sphere import even_directions, of_unit_length
+from limit_surface_ros.surface.support.solvers import ConvexInverse
 from limit_surface_ros.surface.support.tabulated import TabulatedInverse
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.surface.gauges.norm_sum import DissipationTerms
-    from limit_surface_ros.surface.support.solvers import Inverse
     from limit_surface_ros.surface.gauges.one_load import Term, Vector
+    from limit_surface_ros.surface.support.solvers import Inverse
 
 # Twists that the inverse may start from.
 _STARTS = 400

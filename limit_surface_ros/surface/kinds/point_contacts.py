@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Support points: the exact limit surface of a body on finitely many contacts."""
 
 from __future__ import annotations
@@ -10,11 +11,11 @@ import numpy as np
 
 from limit_surface_ros.checks import as_floats, as_positive
 from limit_surface_ros.errors import GeometryError, RangeError, ShapeError
+from limit_surface_ros.surface.gauges.norm_sum import PointTerms
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.kinds.dissipation_surface import DissipationSurface
-from limit_surface_ros.surface.gauges.norm_sum import PointTerms
-from limit_surface_ros.surface.support.many_points import ManyPointsInverse
 from limit_surface_ros.surface.scaling import Scaling
+from limit_surface_ros.surface.support.many_points import ManyPointsInverse
 from limit_surface_ros.surface.support.tabulated import TabulatedInverse
 
 if TYPE_CHECKING:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Homogeneous polynomials of fourth order: the model of Zhou et al., the peer of the other kinds.
 
 J. Zhou, R. Paolini, J. A. Bagnell and M. T. Mason, "A convex polynomial force-motion model for
@@ -15,25 +16,25 @@ import numpy as np
 
 from limit_surface_ros.checks import as_floats, as_vectors
 from limit_surface_ros.errors import MatrixError, ShapeError
+from limit_surface_ros.surface.base import ScaledSurface
+from limit_surface_ros.surface.gauges.one_quartic import OneQuartic
+from limit_surface_ros.surface.gauges.one_twist import wrench_of_one
+from limit_surface_ros.surface.scaling import Scaling
+from limit_surface_ros.surface.sphere import even_directions, of_unit_length
 from limit_surface_ros.surface.support.solvers import (
     ConvexInverse,
     FramedInverse,
     PeakInverse,
     round_frame,
 )
-from limit_surface_ros.surface.gauges.one_quartic import OneQuartic
-from limit_surface_ros.surface.gauges.one_twist import wrench_of_one
-from limit_surface_ros.surface.base import ScaledSurface
-from limit_surface_ros.surface.scaling import Scaling
-from limit_surface_ros.surface.sphere import even_directions, of_unit_length
 from limit_surface_ros.surface.support.tabulated import TabulatedInverse
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.support.solvers import Inverse
     from limit_surface_ros.surface.gauges.one_load import Vector
+    from limit_surface_ros.surface.support.solvers import Inverse
 
 # Exponents (i, j, k) of fx^i fy^j m^k in the order of the coefficients: x^4, x^3 y, x^3 m,
 # x^2 y^2, x^2 y m, x^2 m^2, x y^3, x y^2 m, x y m^2, x m^3, y^4, y^3 m, y^2 m^2, y m^3, m^4.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sums of powers of quadratic forms: H(f) = sum_i (f' A_i f)^p_i, with the surface H = 1."""
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import numpy as np
 
 from limit_surface_ros.checks import as_floats, as_vectors
 from limit_surface_ros.errors import RangeError, ShapeError
+from limit_surface_ros.surface.base import ScaledSurface
 from limit_surface_ros.surface.gauges.one_load import (
     gauge_of_one,
     norm_gradient_of_one,
@@ -19,19 +21,18 @@ from limit_surface_ros.surface.gauges.one_load import (
 )
 from limit_surface_ros.surface.gauges.one_power_sum import OnePowerSum
 from limit_surface_ros.surface.gauges.one_twist import wrench_of_one
-from limit_surface_ros.surface.support.power_sum import power_sum_inverse
 from limit_surface_ros.surface.gauges.power_scale import PowerScale, power_scale
 from limit_surface_ros.surface.linalg import BLIND, as_psd_matrices, root_of
-from limit_surface_ros.surface.base import ScaledSurface
 from limit_surface_ros.surface.scaling import Scaling
 from limit_surface_ros.surface.sphere import of_unit_length, squared_lengths
+from limit_surface_ros.surface.support.power_sum import power_sum_inverse
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.support.solvers import Inverse
     from limit_surface_ros.surface.gauges.one_load import Term, Vector
+    from limit_surface_ros.surface.support.solvers import Inverse
 
 # Part of a twist along a load without limit, above which its power is infinite.
 _FREE = 1e-12

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Loads to twists for hundreds of support points: Newton's method, single precision then double.
 
 Sums over the points are the cost. With the squares of velocities and all moments as products of
@@ -12,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limit_surface_ros.surface.support.newton import newton_moves, plane_basis
 from limit_surface_ros.surface.sphere import of_unit_length
+from limit_surface_ros.surface.support.newton import newton_moves, plane_basis
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Least value of a gauge over a plane: the one optimisation behind both maps' inverses.
 
 A gauge g is positive and homogeneous of degree one. Where n.x = 1 is held and g(x) is least, the

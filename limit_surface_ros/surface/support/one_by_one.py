@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An inverse that takes few vectors one by one, in plain floats: numpy is slow with few."""
 
 from __future__ import annotations
@@ -10,8 +11,8 @@ from limit_surface_ros.surface.gauges.one_twist import most_power_of_one
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.support.solvers import Inverse
     from limit_surface_ros.surface.gauges.one_twist import OneGauge
+    from limit_surface_ros.surface.support.solvers import Inverse
 
 # Vectors up to which one after the other is the quicker way: with one peak, and with several.
 _FEW, _FEW_WITH_SEVERAL = 24, 8

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The inverse of a sum of powers, twist to load, chosen by its exponents and ranks."""
 
 from __future__ import annotations
@@ -7,18 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.surface.gauges.norm_sum import FormTerms
+from limit_surface_ros.surface.gauges.one_power_sum import OnePowerSum
+from limit_surface_ros.surface.gauges.power_scale import power_scale
+from limit_surface_ros.surface.gauges.power_sum import PowerGauge
+from limit_surface_ros.surface.linalg import root_of
+from limit_surface_ros.surface.sphere import even_directions
+from limit_surface_ros.surface.support.one_by_one import OneByOne
 from limit_surface_ros.surface.support.solvers import (
     ConvexInverse,
     FramedInverse,
     PeakInverse,
     round_frame,
 )
-from limit_surface_ros.surface.support.one_by_one import OneByOne
-from limit_surface_ros.surface.gauges.one_power_sum import OnePowerSum
-from limit_surface_ros.surface.gauges.power_sum import PowerGauge
-from limit_surface_ros.surface.gauges.power_scale import power_scale
-from limit_surface_ros.surface.linalg import root_of
-from limit_surface_ros.surface.sphere import even_directions
 from limit_surface_ros.surface.support.tabulated import TabulatedInverse
 
 if TYPE_CHECKING:

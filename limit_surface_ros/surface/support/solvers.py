@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Points of most power on a surface given by its gauge: the inverse of its normals.
 
 Where the surface is convex one climb from a good start is enough; a normal in the cone of a
@@ -10,8 +11,8 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 
-from limit_surface_ros.surface.support.newton import Gauge, certain_minimum, plane_minimum
 from limit_surface_ros.surface.sphere import even_directions, of_unit_length
+from limit_surface_ros.surface.support.newton import Gauge, certain_minimum, plane_minimum
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Bools, Floats, Places

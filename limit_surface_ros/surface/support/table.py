@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The support function of a surface as a table, from which points of most power are read.
 
 The power of the best point, D(n) = max n.x over a surface, is a gauge itself, with the point as

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Many points of most power at once, from a table as soon as that pays.
 
 What the table is not certain of, as across a kink, the inverse that made it solves.
