@@ -2,7 +2,7 @@
 # Every target sets up what it needs first: see scripts/with_ros.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help demo run test lint docs bench clean
+.PHONY: help demo run test test_nightly lint docs bench clean
 
 PROGRAMS := install/limit_surface_ros/lib/limit_surface_ros
 SHARE := install/limit_surface_ros/share/limit_surface_ros
@@ -11,7 +11,7 @@ ARGS ?=
 
 help: ## Show what can be made
 	@echo "limit_surface_ros: make TARGET [ARGS=\"...\"] [PYTHON=python3.12]"
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|'
+	@awk -F ':.*## ' '/^[a-z_]+:.*## / {printf "  %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 demo: ## Start both nodes, call their services, print tables
 	@scripts/with_ros --isolated -- python3 $(PROGRAMS)/demo
@@ -22,6 +22,10 @@ run: ## Serve the models of config/ until Ctrl-C (ARGS go to limit_surface_node)
 
 test: ## Run the tests against the built packages (ARGS go to pytest: ARGS="-k name")
 	@scripts/with_ros --with test --with extras --isolated -- python3 scripts/run_pytest.py $(ARGS)
+
+test_nightly: ## Run the tests that take long, which `make test` leaves out (ARGS go to pytest)
+	@scripts/with_ros --with test --with extras --isolated -- python3 scripts/run_pytest.py \
+	    -m nightly --timeout 1800 $(ARGS)
 
 lint: ## Check style, types and package descriptions
 	@scripts/with_ros --tools lint -- scripts/lint
