@@ -16,12 +16,11 @@ import numpy as np
 from scipy.optimize import least_squares, minimize
 
 from limit_surface_ros.errors import MissingExtraError
-from limit_surface_ros.fitting.cholesky import factors_of, matrices_of
 from limit_surface_ros.fitting.dissipation import fit_dissipation
+from limit_surface_ros.fitting.factors import factors_of, matrices_of
 from limit_surface_ros.fitting.pairs import ScaledPairs, scale_pairs
 from limit_surface_ros.fitting.polynomial import fit_polynomial
-from limit_surface_ros.fitting.power_sum import fit_power_sum
-from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
+from limit_surface_ros.fitting.power_sum import PowerSumObjective, fit_power_sum
 from limit_surface_ros.fitting.result import FitResult
 from limit_surface_ros.fitting.search import Search, descend, process_pool
 from limit_surface_ros.fitting.simulation import simulated_pairs

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""BFGS for a few dozen parameters, in numpy alone, that can go on from a known curvature.
+"""BFGS for a few dozen parameters that can continue from a known inverse Hessian.
 
 scipy's minimisers spend more time around a cost of 0.1 ms than in it, their BLAS threads wait for
-each other in small products, and none takes an inverse Hessian to begin with.
+each other in small products, and none takes an inverse Hessian to begin with. Two BLAS routines
+update the inverse Hessian in place.
 """
 
 from __future__ import annotations

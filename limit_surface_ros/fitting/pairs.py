@@ -147,7 +147,7 @@ def check_support(pairs: ScaledPairs, parameters: int) -> None:
     if count < max(parameters, 1):
         raise DataError(
             f"{counted(count, 'pair')} cannot determine {parameters} parameters: give more "
-            "pairs, fewer terms, or choose the fit that is held towards a simpler one (--auto)"
+            "pairs, fewer terms, or choose the fit for few pushes (--auto)"
         )
     against = int(np.count_nonzero(np.sum(pairs.wrenches * pairs.directions, axis=1) < 0.0))
     if against > count / 2:

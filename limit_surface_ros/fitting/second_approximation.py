@@ -18,7 +18,7 @@ import numpy as np
 
 from limit_surface_ros.checks import as_floats
 from limit_surface_ros.errors import RangeError, SolverError
-from limit_surface_ros.fitting.cholesky import (
+from limit_surface_ros.fitting.factors import (
     PARAMETERS_PER_MATRIX,
     factors_of,
     factors_of_matrices,
@@ -26,12 +26,11 @@ from limit_surface_ros.fitting.cholesky import (
     parameter_gradient,
     parameters_of,
 )
-from limit_surface_ros.fitting.direction_loss import direction_loss
+from limit_surface_ros.fitting.motion_cost import direction_loss
 from limit_surface_ros.fitting.pairs import check_support, scale_pairs
-from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
-from limit_surface_ros.fitting.result import FitResult, errors_on
+from limit_surface_ros.fitting.power_sum import PowerSumObjective
+from limit_surface_ros.fitting.result import FitResult, errors_on, is_sound
 from limit_surface_ros.fitting.search import Search, descend, descents
-from limit_surface_ros.fitting.solve import is_sound
 from limit_surface_ros.surface.kinds.power_sum import PowerSum, thesis_exponents
 
 if TYPE_CHECKING:
@@ -90,15 +89,17 @@ class SecondObjective:
         weighted = weights * residual
         cost = weighted @ residual + self._velocity_weight * (weights @ loss)
         slope *= self._velocity_weight * weights / norms
-        pull = slope[:, None] * (directions - cosines[:, None] * units)
-        # What A feels of the cost comes back through its dependence on the roots.
-        of_inner = self._monomials.T @ (2.0 * weighted)
-        outer = 2.0 * pull.T @ loads
-        of_inner += 0.5 * (outer + outer.T)[_ROWS, _COLUMNS] * _TWICE
-        of_roots = 2.0 * weighted - of_inner @ self._inverse
-        of_roots -= np.einsum("nc,nc->n", pull, products) / roots**2
-        of_matrix = ((0.5 * of_roots / roots)[:, None] * loads + pull / roots[:, None]).T @ loads
-        return float(cost), parameter_gradient(of_matrix[None], factors)
+        by_normals = slope[:, None] * (directions - cosines[:, None] * units)
+        # A depends on the roots: the chain rule brings the gradient by A back to them.
+        by_inner = self._monomials.T @ (2.0 * weighted)
+        outer = 2.0 * by_normals.T @ loads
+        by_inner += 0.5 * (outer + outer.T)[_ROWS, _COLUMNS] * _TWICE
+        by_roots = 2.0 * weighted - by_inner @ self._inverse
+        by_roots -= np.einsum("nc,nc->n", by_normals, products) / roots**2
+        by_matrix = (
+            (0.5 * by_roots / roots)[:, None] * loads + by_normals / roots[:, None]
+        ).T @ loads
+        return float(cost), parameter_gradient(by_matrix[None], factors)
 
     def start(self, rng: np.random.Generator) -> Floats:
         """Return a random B that takes half of H on average."""

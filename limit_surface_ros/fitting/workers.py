@@ -53,7 +53,7 @@ def worker_processes(workers: int) -> Iterator[Executor]:
     try:
         yield pool
     except BaseException:
-        # A pool that was told to shut down no longer knows it.
+        # After shutdown the pool no longer knows this pipe.
         reader = _end_of_tasks(pool)
         _forget_what_waits(pool)
         for process in set(multiprocessing.active_children()) - others:

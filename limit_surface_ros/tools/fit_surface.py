@@ -94,16 +94,16 @@ def starts_in_words(result: FitResult) -> str:
     """Tell how many starts led to the best cost, and what the next best was."""
     costs, best = result.start_costs, result.start_costs[0]
     others = [cost for cost in costs if cost > best * (1.0 + AGREEMENT) + NO_COST]
-    told = f"{len(costs) - len(others)} of {counted(len(costs), 'start')} agree"
+    message = f"{len(costs) - len(others)} of {counted(len(costs), 'start')} agree"
     if others:
-        told += f", the next best cost {min(others):.6g}"
+        message += f", the next best cost {min(others):.6g}"
     if result.cost > result.details.get("projected_cost", result.cost):
         # Of the second approximation alone, whose starts leave a matrix free to be indefinite.
-        told += (
+        message += (
             f"; their best cost {best:.6g} is of a surface that is not closed, the cost above of "
             "the model, which is closed: --terms 2 without --objective second may fit better"
         )
-    return told
+    return message
 
 
 def print_errors(label: str, errors: Errors) -> None:

@@ -126,7 +126,7 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
     few.add_argument(
         "--auto",
         action="store_true",
-        help="choose kind, terms, weight and what the fit is held towards (the pressure on the "
+        help="choose kind, terms, weight and the prior of the fit (the pressure on the "
         "ground that fits the pushes, or an ellipsoid) by cross-validation; leaves the options "
         "above aside",
     )
@@ -204,13 +204,13 @@ def _add_bag_options(bags: argparse._ArgumentGroup) -> None:
         "lever": "m|turns angular speed into speed",
     }
     for rule, default in asdict(Selection()).items():
-        unit, _, told = helps[rule].partition("|")
+        unit, _, meaning = helps[rule].partition("|")
         bags.add_argument(
             f"--{rule.replace('_', '-')}",
             type=float,
             default=default,
             metavar="X",
-            help=f"{told} [{unit}] (%(default)s)",
+            help=f"{meaning} [{unit}] (%(default)s)",
         )
 
 
@@ -302,11 +302,11 @@ def fit(options: argparse.Namespace, data: TrainingData, search: Search) -> FitR
             search=search,
         )
     else:
-        result = fit_as_told(options, data, scaling, search)
+        result = fit_as_asked(options, data, scaling, search)
     return result if data.held_out is None else result.tested_on(data.held_out)
 
 
-def fit_as_told(
+def fit_as_asked(
     options: argparse.Namespace, data: TrainingData, scaling: Scaling, search: Search
 ) -> FitResult:
     """Fit the kind and the objective that the options name."""

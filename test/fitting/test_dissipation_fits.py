@@ -7,15 +7,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from limit_surface_ros.errors import DataError, RangeError
-from limit_surface_ros.fitting.combined_objectives import HeldObjective, SumOfObjectives
-from limit_surface_ros.fitting.dissipation import fit_dissipation
-from limit_surface_ros.fitting.dissipation_direction_objective import (
-    DissipationDirectionObjective,
+from limit_surface_ros.fitting.dissipation import (
+    DirectionObjective,
+    ForceObjective,
+    fit_dissipation,
 )
-from limit_surface_ros.fitting.dissipation_force_objective import DissipationForceObjective
+from limit_surface_ros.fitting.motion_cost import SmoothSupportSolver
+from limit_surface_ros.fitting.objective import RegularisedObjective, SumOfObjectives
 from limit_surface_ros.fitting.pairs import scale_pairs
 from limit_surface_ros.fitting.search import Search
-from limit_surface_ros.fitting.smooth_inverse import SmoothInverse
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.measures import load_error, velocity_error
@@ -41,21 +41,21 @@ def triangle_pairs(motions: int, per_facet: int) -> Pairs:
 @given(
     seed=st.integers(0, 2**32 - 1),
     terms=st.integers(1, 4),
-    kind=st.sampled_from(["forces", "directions", "both", "held"]),
+    kind=st.sampled_from(["forces", "directions", "both", "regularised"]),
     robust=st.sampled_from([None, 0.2]),
 )
 def test_gradients_agree_with_finite_differences(seed, terms, kind, robust):
     rng = np.random.default_rng(seed)
     pairs = scale_pairs(triangle_pairs(30, 2), SCALING)
     pairs = pairs.weighted(rng.exponential(size=len(pairs)))
-    forces = DissipationForceObjective(pairs, terms, floor=0.01)
-    directions = DissipationDirectionObjective(pairs, terms, 1.3, robust, floor=0.01)
+    forces = ForceObjective(pairs, terms, floor=0.01)
+    directions = DirectionObjective(pairs, terms, 1.3, robust, floor=0.01)
     start = directions.start(rng)
     objective = {
         "forces": forces,
         "directions": directions,
         "both": SumOfObjectives(directions, forces),
-        "held": HeldObjective(directions, start + 0.1, 3.0),
+        "regularised": RegularisedObjective(directions, start + 0.1, 3.0),
     }[kind]
     _, gradient = objective.cost_and_gradient(start)
     step = 1e-6
@@ -77,7 +77,7 @@ def test_the_smooth_inverse_finds_the_motions_of_the_surface(seed):
     factors = np.tril(rng.normal(size=(3, 3, 3)))
     matrices = factors @ factors.transpose(0, 2, 1) + 1e-3 * np.eye(3)
     loads = rng.normal(size=(50, 3))
-    inverse = SmoothInverse(np.ascontiguousarray(loads.T))
+    inverse = SmoothSupportSolver(np.ascontiguousarray(loads.T))
     inverse.solve(matrices)
     found = inverse.motions / np.linalg.norm(inverse.motions, axis=0)
     surface = Dissipation(matrices)

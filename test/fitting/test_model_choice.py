@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Few, noisy pushes: held and chosen fits keep their promises."""
+"""Few, noisy pushes: regularised and chosen fits keep their promises."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ import pytest
 from limit_surface_ros.errors import DataError, RangeError
 from limit_surface_ros.fitting.few_pushes.automatic import fit_automatically
 from limit_surface_ros.fitting.few_pushes.cross_validation import choose_recipe, default_candidates
-from limit_surface_ros.fitting.few_pushes.recipe import Recipe, Workbench
+from limit_surface_ros.fitting.few_pushes.recipe import FitContext, Recipe
 from limit_surface_ros.fitting.few_pushes.uncertainty import (
     bootstrap,
     stored_surfaces,
@@ -28,7 +28,7 @@ TRIANGLE = PointContacts(
     np.array([2.0, 1.0, 1.5]),
     Scaling(0.08, 2.0),
 )
-PRESSURE = Recipe(terms=8, towards="pressure", strength=5.0)
+PRESSURE = Recipe(terms=8, prior="pressure", prior_weight=5.0)
 ELLIPSOID = Recipe("power_sum", 1)
 
 
@@ -41,28 +41,28 @@ def noisy_pushes(count: int, seed: int = 0, body=TRIANGLE) -> Pairs:
 
 
 def fitted(pushes: Pairs, recipe: Recipe, support=None):
-    return Workbench(pushes, support=support).fit(recipe)[0]
+    return FitContext(pushes, support=support).fit(recipe)[0]
 
 
 def test_a_strong_prior_returns_the_support_points_and_a_weak_one_follows_the_pushes():
     pushes, test = noisy_pushes(12), random_loads(TRIANGLE, 300, 9)
     wrong = PointContacts(TRIANGLE.points + np.array([0.02, 0.0]), np.ones(3), TRIANGLE.scaling)
     known, led_astray, followed = (
-        fitted(pushes, Recipe(towards="support", strength=strength), points)
-        for points, strength in ((TRIANGLE, 1e6), (wrong, 1e6), (wrong, 0.1))
+        fitted(pushes, Recipe(prior="support", prior_weight=weight), points)
+        for points, weight in ((TRIANGLE, 1e6), (wrong, 1e6), (wrong, 0.1))
     )
     assert np.degrees(mean_angle(known, test)) < 4.0
     assert mean_angle(followed, test) < mean_angle(led_astray, test)
 
 
-def test_holding_towards_a_pressure_helps_with_few_noisy_pushes():
+def test_a_pressure_as_prior_helps_with_few_noisy_pushes():
     test = random_loads(TRIANGLE, 300, 9)
-    free, ellipsoid, held = (
+    free, ellipsoid, regularised = (
         np.mean([mean_angle(fitted(noisy_pushes(15, seed), each), test) for seed in range(4)])
         for each in (Recipe(), ELLIPSOID, PRESSURE)
     )
-    assert held < 0.9 * free
-    assert held < 0.9 * ellipsoid
+    assert regularised < 0.9 * free
+    assert regularised < 0.9 * ellipsoid
 
 
 def test_a_held_fit_is_convex_and_has_few_terms():
@@ -113,13 +113,13 @@ def test_friction_that_depends_on_direction_is_chosen_against_a_pressure():
     body = Dissipation(factors @ factors.transpose(0, 2, 1), Scaling(0.08, 2.0))
     pushes, test = noisy_pushes(40, body=body), random_loads(body, 300, 9)
     choice = choose_recipe(pushes)
-    assert choice.recipe.towards != "pressure"
+    assert choice.recipe.prior != "pressure"
     assert mean_angle(choice.surface, test) < mean_angle(fitted(pushes, PRESSURE), test)
 
 
 def test_a_recipe_that_is_trusted_more_is_not_displaced_by_a_lucky_one():
     pushes = noisy_pushes(16)
-    twins = [Recipe("power_sum", 2), Recipe("power_sum", 2, strength=3.0)]
+    twins = [Recipe("power_sum", 2), Recipe("power_sum", 2, prior_weight=3.0)]
     assert choose_recipe(pushes, candidates=twins).recipe is twins[0]
 
 
@@ -137,21 +137,21 @@ def test_a_bootstrap_is_surer_with_more_pushes_and_outlives_its_file():
 
 
 def test_known_support_points_enter_the_candidates_first():
-    assert default_candidates(True)[0].towards == "support"
-    assert all(each.towards != "support" for each in default_candidates(False))
+    assert default_candidates(True)[0].prior == "support"
+    assert all(each.prior != "support" for each in default_candidates(False))
 
 
 def test_given_support_points_are_used_unless_the_pushes_speak_against_them():
     pushes = noisy_pushes(25)
-    assert choose_recipe(pushes, support=TRIANGLE).recipe.towards == "support"
+    assert choose_recipe(pushes, support=TRIANGLE).recipe.prior == "support"
     elsewhere = PointContacts(TRIANGLE.points + 0.1, np.ones(3), TRIANGLE.scaling)
-    assert choose_recipe(pushes, support=elsewhere).recipe.towards != "support"
+    assert choose_recipe(pushes, support=elsewhere).recipe.prior != "support"
 
 
 def test_the_many_support_points_of_a_patch_are_summed_up_in_eight_terms():
     grid = np.stack(np.meshgrid(np.linspace(-0.1, 0.1, 40), np.linspace(-0.05, 0.05, 30)), axis=-1)
     patch = PointContacts(grid.reshape(-1, 2), np.full(1200, 1e-3), Scaling(0.08, 1.2))
-    surface = fitted(random_loads(patch, 30, 0), Recipe(towards="support", strength=20.0), patch)
+    surface = fitted(random_loads(patch, 30, 0), Recipe(prior="support", prior_weight=20.0), patch)
     assert len(surface.matrices) == 8
     assert np.degrees(mean_angle(surface, random_loads(patch, 300, 9))) < 3.0
 
@@ -159,7 +159,7 @@ def test_the_many_support_points_of_a_patch_are_summed_up_in_eight_terms():
 def test_what_cannot_be_chosen_is_refused():
     pushes = noisy_pushes(20)
     with pytest.raises(DataError, match="support points"):
-        fitted(pushes, Recipe(towards="support"))
+        fitted(pushes, Recipe(prior="support"))
     with pytest.raises(DataError, match=r"5 pushes are too few, .* at least 8"):
         choose_recipe(Pairs(pushes.wrenches[:5], pushes.twists[:5]))
     with pytest.raises(RangeError, match="folds"):
@@ -167,7 +167,7 @@ def test_what_cannot_be_chosen_is_refused():
     with pytest.raises(RangeError, match=f"at most one for each of the {len(pushes)} pushes"):
         choose_recipe(pushes, folds=1000)
     with pytest.raises(RangeError, match="only dissipation"):
-        Recipe("power_sum", towards="support")
+        Recipe("power_sum", prior="support")
 
 
 def test_choice_and_bootstrap_tell_of_their_progress_as_one():

@@ -5,11 +5,10 @@ import numpy as np
 import pytest
 
 from limit_surface_ros.errors import DataError, RangeError
-from limit_surface_ros.fitting.cholesky import factors_of_matrices, parameters_of
+from limit_surface_ros.fitting.factors import factors_of_matrices, parameters_of
 from limit_surface_ros.fitting.pairs import scale_pairs
 from limit_surface_ros.fitting.polynomial import fit_polynomial
-from limit_surface_ros.fitting.power_sum import fit_power_sum
-from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
+from limit_surface_ros.fitting.power_sum import PowerSumObjective, fit_power_sum
 from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.second_approximation import (
     SecondObjective,

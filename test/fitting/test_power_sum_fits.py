@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 
 from limit_surface_ros.errors import DataError, RangeError
 from limit_surface_ros.fitting.pairs import ScaledPairs, scale_pairs
-from limit_surface_ros.fitting.power_sum import fit_power_sum
-from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
+from limit_surface_ros.fitting.power_sum import PowerSumObjective, fit_power_sum
 from limit_surface_ros.fitting.search import Search, descents, process_pool
 from limit_surface_ros.fitting.simulation import simulated_pairs
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts

@@ -6,8 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from limit_surface_ros.fitting.few_pushes.pressure import PressureObjective, fit_pressure
-from limit_surface_ros.fitting.few_pushes.small_contacts import SmallContacts
+from limit_surface_ros.fitting.few_pushes.pressure import (
+    PressureObjective,
+    SmallContacts,
+    fit_pressure,
+)
 from limit_surface_ros.fitting.pairs import ScaledPairs, scale_pairs
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
@@ -40,7 +43,7 @@ def test_the_centre_of_pressure_and_the_total_friction_are_recovered():
 
 
 def test_motions_are_predicted_from_few_exact_pushes():
-    contacts = fitted(scale_pairs(random_loads(BODY, 40, 0), BODY.scaling)).that_carry()
+    contacts = fitted(scale_pairs(random_loads(BODY, 40, 0), BODY.scaling)).loaded()
     surface = Dissipation(contacts.matrices, BODY.scaling)
     assert np.degrees(mean_angle(surface, random_loads(BODY, 300, 1))) < 8.0
 
@@ -119,4 +122,4 @@ def test_known_points_are_scaled_to_the_pushes_and_those_without_load_left_out(s
 def test_many_equal_contacts_all_carry():
     grid = np.stack(np.meshgrid(np.arange(40.0), np.arange(30.0)), axis=-1).reshape(-1, 2)
     contacts = SmallContacts(grid, np.append(np.ones(1199), 1e-6), np.full(1200, 0.5))
-    assert len(contacts.that_carry().limits) == 1199
+    assert len(contacts.loaded().limits) == 1199

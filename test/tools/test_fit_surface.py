@@ -226,7 +226,9 @@ def test_what_is_wrong_with_the_data_is_told_with_their_file(pushes, tmp_path, c
     assert main([str(pushes), "-o", str(tmp_path / "m.yaml")]) == 2
     assert "pushes.csv: 3 pairs cannot determine 18 parameters" in capsys.readouterr().err
     assert main([str(pushes), "-o", str(tmp_path / "m.yaml"), "--auto"]) == 2
-    assert "pushes.csv: 3 pushes are too few, even for a fit" in capsys.readouterr().err
+    assert (
+        "pushes.csv: 3 pushes are too few, even for a regularised fit" in capsys.readouterr().err
+    )
 
 
 def test_an_error_names_the_file_of_the_data_once(pushes, tmp_path, capsys):

@@ -17,8 +17,8 @@ import numpy as np
 from limit_surface_ros.errors import DataError, LimitSurfaceError, RangeError
 from limit_surface_ros.fitting.few_pushes.recipe import (
     FEWEST_PAIRS,
+    FitContext,
     Recipe,
-    Workbench,
     check_pushes,
 )
 from limit_surface_ros.fitting.pairs import scale_pairs
@@ -48,13 +48,13 @@ def default_candidates(with_support: bool) -> list[Recipe]:
         with_support: Whether support points are known.
     """
     candidates = [
-        Recipe(terms=_TERMS, towards="pressure", strength=5.0),
-        Recipe(terms=3, towards="ellipsoid", strength=2.0),
-        Recipe("power_sum", 3, velocity_weight=0.5, towards="ellipsoid", strength=2.0),
+        Recipe(terms=_TERMS, prior="pressure", prior_weight=5.0),
+        Recipe(terms=3, prior="ellipsoid", prior_weight=2.0),
+        Recipe("power_sum", 3, velocity_weight=0.5, prior="ellipsoid", prior_weight=2.0),
         Recipe("power_sum", 1),
     ]
     if with_support:
-        candidates.insert(0, Recipe(towards="support", strength=20.0))
+        candidates.insert(0, Recipe(prior="support", prior_weight=20.0))
     return candidates
 
 
@@ -120,7 +120,7 @@ def choose_recipe(
         seen = np.setdiff1d(np.arange(count), part)
         training = Pairs(pairs.wrenches[seen], pairs.twists[seen])
         held_out = Pairs(pairs.wrenches[part], pairs.twists[part])
-        tasks.append((Workbench(training, scaling, support, seed=seed), held_out, recipes))
+        tasks.append((FitContext(training, scaling, support, seed=seed), held_out, recipes))
     if executor is None:
         found = (_angles(*task) for task in tasks)
     else:
@@ -134,16 +134,16 @@ def choose_recipe(
     if not np.isfinite(angles).all(axis=1).any():
         raise DataError("no candidate could be fitted to every fold: give more pushes")
     recipe = recipes[_chosen(angles)]
-    surface, descent = Workbench(pairs, scaling, support, seed=seed).fit(recipe)
+    surface, descent = FitContext(pairs, scaling, support, seed=seed).fit(recipe)
     return Choice(recipe, surface, descent, recipes, angles)
 
 
-def _angles(bench: Workbench, held_out: Pairs, recipes: Sequence[Recipe]) -> Floats:
+def _angles(context: FitContext, held_out: Pairs, recipes: Sequence[Recipe]) -> Floats:
     """Return the errors [rad] of each recipe's fit on held-out pushes, shape (recipes, n)."""
     angles = np.full((len(recipes), len(held_out)), np.inf)
     for row, recipe in enumerate(recipes):
         try:
-            angles[row] = angle_error(bench.fit(recipe)[0], held_out)
+            angles[row] = angle_error(context.fit(recipe)[0], held_out)
         except LimitSurfaceError:
             # A candidate that a fold cannot support stays infinitely bad.
             continue

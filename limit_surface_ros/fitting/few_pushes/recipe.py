@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How to fit few, noisy pushes: kind, terms, weight, and what the fit is held towards.
+"""How to fit few, noisy pushes: kind, terms, weights and prior.
 
 Two means keep a fit of many parameters to few pushes from following their errors: the error of
-motion is robust, see `direction_loss`, and the fit is held towards a simpler surface of the same
-pushes, which is
+motion is robust, see `motion_cost`, and the fit is regularised by a prior, a simpler surface of
+the same pushes, which is
 
 - the pressure that fits them best, on contacts spread over wherever the body may stand, summed up
   in a few; or that on known support points; as a Gaussian prior on the factors of the terms;
 - or the ellipsoid that fits them, through pairs on it that count a little.
 
-The surface that is held towards isotropic friction under some pressure is not bound to it: with
-more pushes, or a weaker hold, every matrix of the dissipation model is free.
+Isotropic friction under some pressure is a prior and no constraint: with more pushes, or a smaller
+prior weight, every matrix of the dissipation model is free.
 """
 
 from __future__ import annotations
@@ -23,17 +23,16 @@ import numpy as np
 
 from limit_surface_ros.checks import counted
 from limit_surface_ros.errors import DataError, RangeError, SolverError
-from limit_surface_ros.fitting.combined_objectives import HeldObjective
-from limit_surface_ros.fitting.dissipation_direction_objective import (
-    DissipationDirectionObjective,
+from limit_surface_ros.fitting.dissipation import (
+    DirectionObjective,
 )
-from limit_surface_ros.fitting.dissipation_parameters import floored_parameters
-from limit_surface_ros.fitting.few_pushes.pressure import fit_pressure
-from limit_surface_ros.fitting.few_pushes.small_contacts import SmallContacts
+from limit_surface_ros.fitting.factors import floored_parameters
+from limit_surface_ros.fitting.few_pushes.pressure import SmallContacts, fit_pressure
+from limit_surface_ros.fitting.objective import RegularisedObjective
 from limit_surface_ros.fitting.pairs import ScaledPairs, check_support, scale_pairs
-from limit_surface_ros.fitting.power_sum_objective import PowerSumObjective
+from limit_surface_ros.fitting.power_sum import PowerSumObjective
+from limit_surface_ros.fitting.result import is_sound
 from limit_surface_ros.fitting.search import descend_from_seed
-from limit_surface_ros.fitting.solve import is_sound
 from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.sampling import random_loads
 
@@ -45,20 +44,20 @@ if TYPE_CHECKING:
     from limit_surface_ros.surface.protocol import LimitSurface
     from limit_surface_ros.surface.scaling import Scaling
 
-Towards = Literal["nothing", "ellipsoid", "pressure", "support"]
+Prior = Literal["none", "ellipsoid", "pressure", "support"]
 
-# Pushes fewer than an ellipsoid's parameters say nothing, whatever a fit is held towards.
+# Pushes fewer than an ellipsoid's parameters say nothing, whatever the prior.
 FEWEST_PAIRS = 6
 # Chord between unit motions beyond which its cost grows linearly.
 _ROBUST_SCALE = 0.2
-# Share of a term that keeps it smooth; see `dissipation_parameters`.
+# Share of a term that keeps it smooth; see `factors`.
 _FLOOR = 1e-3
 # Terms that sum up known support points, where there are more of them: those of a patch are many.
 _MOST_KNOWN = 8
 # Pairs that stand for the ellipsoid.
 _ELLIPSOID_PAIRS = 40
 # How much the usual pressure counts: little where nothing is known, much at known points.
-_ENTROPY = {"pressure": 0.05, "support": 30.0}
+_ENTROPY_WEIGHT = {"pressure": 0.05, "support": 30.0}
 # Relative gain of a step below which a fit ends: noisy pushes do not tell closer minima apart, but
 # power sums descend slowly at first.
 _PRECISION = {"power_sum": 1e-6, "dissipation": 1e-4}
@@ -70,11 +69,11 @@ class Recipe:
 
     Attributes:
         kind: "power_sum" of norms, or "dissipation", fitted on directions.
-        terms: How many terms at most; towards support points there is one for each of them, or
+        terms: How many terms at most; with known support points there is one for each of them, or
             eight that stand for them all where they are more.
         velocity_weight: Weight of the motions against the loads.
-        towards: What the fit is held towards.
-        strength: How much that counts: pushes' worth for the ellipsoid, for the others the
+        prior: The simpler surface of the same pushes that regularises the fit.
+        prior_weight: How much that counts: pushes' worth for the ellipsoid, for the others the
             inverse variance of the scaled factors of a term, for each term.
 
     Raises:
@@ -84,37 +83,37 @@ class Recipe:
     kind: Literal["power_sum", "dissipation"] = "dissipation"
     terms: int = 3
     velocity_weight: float = 2.0
-    towards: Towards = "nothing"
-    strength: float = 1.0
+    prior: Prior = "none"
+    prior_weight: float = 1.0
 
     def __post_init__(self) -> None:
         """Check what belongs together."""
         if self.terms < 1:
             raise RangeError("a recipe needs at least one term")
-        if self.towards in _ENTROPY and self.kind != "dissipation":
-            raise RangeError("only dissipation models can be held towards a pressure")
-        if not self.velocity_weight >= 0.0 or not self.strength > 0.0:
-            raise RangeError("velocity_weight must not be negative, strength must be above 0")
+        if self.prior in _ENTROPY_WEIGHT and self.kind != "dissipation":
+            raise RangeError("only dissipation models can have a pressure as their prior")
+        if not self.velocity_weight >= 0.0 or not self.prior_weight > 0.0:
+            raise RangeError("velocity_weight must not be negative, prior_weight must be above 0")
 
     def __str__(self) -> str:
         """Return the recipe in words."""
         words: list[str] = [self.kind if self.kind == "dissipation" else "power_sum (norms)"]
-        if self.towards != "support":
+        if self.prior != "support":
             words.append(counted(self.terms, "term"))
         words.append(f"velocity weight {self.velocity_weight:g}")
-        if self.towards != "nothing":
-            words.append(f"towards {self.towards} {self.strength:g}")
+        if self.prior != "none":
+            words.append(f"prior {self.prior}, prior weight {self.prior_weight:g}")
         return ", ".join(words)
 
 
 @dataclass(frozen=True)
-class Workbench:
-    """Pushes, and what several recipes make of them on their way.
+class FitContext:
+    """Pushes, and the intermediate results that several recipes share.
 
     Attributes:
         pairs: Recorded pushes.
         scaling: Characteristic length and friction force; chosen from the pairs if not given.
-        support: The known support points, for recipes held towards them; only the ratios of the
+        support: The known support points, for recipes whose prior they are; only the ratios of the
             friction limits count, their size is taken from the pushes.
         weights: How much each push counts, shape (n,); 1 each if not given.
         seed: Of random starts.
@@ -154,71 +153,65 @@ class Workbench:
             raise SolverError(f"the fit by {recipe} does not pass through the loads")
         return surface, descent
 
-    def pressure(self, towards: Towards, velocity_weight: float) -> SmallContacts:
+    def pressure(self, prior: Prior, velocity_weight: float) -> SmallContacts:
         """Return the contacts that carry the body, by the pushes and what is known before.
 
         Args:
-            towards: "pressure", from contacts all over, or "support", from the known points.
+            prior: "pressure", from contacts all over, or "support", from the known points.
             velocity_weight: Weight of the motions against the loads.
 
         Raises:
             DataError: Support points are needed, and none are known.
         """
-        known = self._pressures.get((towards, velocity_weight))
+        known = self._pressures.get((prior, velocity_weight))
         if known is not None:
             return known
-        if towards == "pressure":
+        if prior == "pressure":
             usual = SmallContacts.on_a_disc(self.scaled)
         elif self.support is not None:
             usual = SmallContacts.at(self.support, self.scaled)
         else:
-            raise DataError("no support points are known that the fit could be held towards")
+            raise DataError("no support points are known that the prior could be made of")
         found = fit_pressure(
-            self.scaled, usual, _ENTROPY[towards], velocity_weight, _ROBUST_SCALE
-        ).that_carry()
-        self._pressures[towards, velocity_weight] = found
+            self.scaled, usual, _ENTROPY_WEIGHT[prior], velocity_weight, _ROBUST_SCALE
+        ).loaded()
+        self._pressures[prior, velocity_weight] = found
         return found
 
     def _objective(self, recipe: Recipe) -> Objective:
         pairs, weight = self.scaled, recipe.velocity_weight
-        if recipe.towards in _ENTROPY:
-            contacts = self.pressure(recipe.towards, weight)
-            contacts = contacts.merged(
-                recipe.terms if recipe.towards == "pressure" else _MOST_KNOWN
-            )
+        if recipe.prior in _ENTROPY_WEIGHT:
+            contacts = self.pressure(recipe.prior, weight)
+            contacts = contacts.merged(recipe.terms if recipe.prior == "pressure" else _MOST_KNOWN)
             matrices = contacts.matrices
-            free = DissipationDirectionObjective(
-                pairs, len(matrices), weight, _ROBUST_SCALE, _FLOOR
-            )
+            free = DirectionObjective(pairs, len(matrices), weight, _ROBUST_SCALE, _FLOOR)
             centre = floored_parameters(matrices, _FLOOR)
-            return HeldObjective(free, centre, recipe.strength * len(matrices))
-        if recipe.towards == "ellipsoid":
-            pairs = pairs.joined(_ellipsoid_pairs(pairs, weight, recipe.strength))
+            return RegularisedObjective(free, centre, recipe.prior_weight * len(matrices))
+        if recipe.prior == "ellipsoid":
+            pairs = pairs.joined(_ellipsoid_pairs(pairs, weight, recipe.prior_weight))
         if recipe.kind == "dissipation":
-            return DissipationDirectionObjective(
-                pairs, recipe.terms, weight, _ROBUST_SCALE, _FLOOR
-            )
+            return DirectionObjective(pairs, recipe.terms, weight, _ROBUST_SCALE, _FLOOR)
         return PowerSumObjective(pairs, np.full(recipe.terms, 0.5), weight, _ROBUST_SCALE)
 
 
 def check_pushes(pairs: ScaledPairs, fewest: int) -> None:
-    """Refuse pushes that say nothing, whatever a fit is held towards.
+    """Refuse pushes that say nothing, whatever the prior.
 
     Raises:
         DataError: They are fewer than `fewest`, or see `check_support`.
     """
     if len(pairs) < fewest:
         raise DataError(
-            f"{len(pairs)} pushes are too few, even for a fit that is held towards a simpler "
-            f"one: at least {fewest} are needed"
+            f"{len(pairs)} pushes are too few, even for a regularised fit: "
+            f"at least {fewest} are needed"
         )
     check_support(pairs, 0)
 
 
-def _ellipsoid_pairs(pairs: ScaledPairs, weight: float, strength: float) -> ScaledPairs:
-    """Return pairs spread over the ellipsoid that fits `pairs`, that count `strength` together."""
+def _ellipsoid_pairs(pairs: ScaledPairs, weight: float, prior_weight: float) -> ScaledPairs:
+    """Return pairs spread over the ellipsoid that fits `pairs`, with `prior_weight` in all."""
     objective = PowerSumObjective(pairs, np.array([0.5]), weight, _ROBUST_SCALE)
     descent = descend_from_seed(objective, 0, 0, _PRECISION["power_sum"])
     surface = objective.surface(descent.parameters)
     spread = scale_pairs(random_loads(surface, _ELLIPSOID_PAIRS, 0), pairs.scaling)
-    return spread.weighted(np.full(_ELLIPSOID_PAIRS, strength / _ELLIPSOID_PAIRS))
+    return spread.weighted(np.full(_ELLIPSOID_PAIRS, prior_weight / _ELLIPSOID_PAIRS))

@@ -13,7 +13,7 @@ import numpy as np
 
 from limit_surface_ros.checks import as_floats
 from limit_surface_ros.errors import DataError, RangeError, SolverError
-from limit_surface_ros.fitting.few_pushes.recipe import Workbench
+from limit_surface_ros.fitting.few_pushes.recipe import FitContext
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
 
@@ -50,7 +50,7 @@ def bootstrap(
         recipe: How to fit.
         count: How many refits, at least 2.
         scaling: Characteristic length and friction force; chosen from the pairs if not given.
-        support: Known support points, for recipes held towards them.
+        support: Known support points, for recipes whose prior they are.
         seed: Of weights and random starts.
         executor: Where refits run; here and one by one if not given.
         progress: Called with (refits done, refits in all) after each.
@@ -64,7 +64,7 @@ def bootstrap(
         raise RangeError(f"a bootstrap needs at least 2 refits, got {count}")
     weights = np.random.default_rng([seed, count]).exponential(size=(count, len(pairs)))
     weights /= weights.mean(axis=1, keepdims=True)
-    tasks = [(Workbench(pairs, scaling, support, each, seed), recipe) for each in weights]
+    tasks = [(FitContext(pairs, scaling, support, each, seed), recipe) for each in weights]
     if executor is None:
         found = (_refit(*task) for task in tasks)
     else:
@@ -81,9 +81,9 @@ def bootstrap(
     return surfaces
 
 
-def _refit(bench: Workbench, recipe: Recipe) -> LimitSurface | None:
+def _refit(context: FitContext, recipe: Recipe) -> LimitSurface | None:
     try:
-        return bench.fit(recipe)[0]
+        return context.fit(recipe)[0]
     except SolverError:
         # Weights under which the fit is lost: the others show the spread.
         return None
