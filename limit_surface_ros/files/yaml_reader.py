@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 import reprlib
-import stat
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +19,7 @@ import yaml
 from limit_surface_ros.checks import LARGEST
 from limit_surface_ros.errors import FileError, LimitSurfaceError
 from limit_surface_ros.files.atomic_write import write_atomically
+from limit_surface_ros.files.regular_file import read_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping
@@ -285,20 +285,6 @@ class Section:
         return number
 
 
-def _text_of(path: Path) -> str:
-    """Return the text of a model file, once it is clear that it can be one."""
-    status = path.stat()
-    if stat.S_ISDIR(status.st_mode):
-        raise FileError(f"{path}: cannot be read: Is a directory")
-    if not stat.S_ISREG(status.st_mode):
-        raise FileError(f"{path}: cannot be read: it is no regular file")
-    if status.st_size > MAX_BYTES:
-        raise FileError(
-            f"{path}: has {status.st_size} bytes; at most {MAX_BYTES} are read as a model"
-        )
-    return path.read_text(encoding="utf-8")
-
-
 def _check_depth(text: str) -> None:
     """Refuse what is nested so deep that building it would overflow the C stack of libyaml."""
     depth = 0
@@ -328,12 +314,7 @@ def read_yaml(path: str | Path) -> Section:
         FileError: The file is absent, unreadable, no YAML, or no mapping.
     """
     path = Path(path)
-    try:
-        text = _text_of(path)
-    except OSError as error:
-        raise FileError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError as error:
-        raise FileError(f"{path}: is not UTF-8 text: {error}") from None
+    text = read_text(path, MAX_BYTES)
     try:
         if len(text) > SHALLOW_LENGTH:
             _check_depth(text)
