@@ -18,17 +18,17 @@ from scipy.optimize import linprog
 from scipy.special import lambertw
 
 from limit_surface_ros.decay import examples
-from limit_surface_ros.decay.coefficients import fit_coefficients
+from limit_surface_ros.decay.basis import count_terms, real_basis
+from limit_surface_ros.decay.coefficients import fit_coefficients, fit_response
 from limit_surface_ros.decay.delay.construction import delay_system, system_of_kernel
 from limit_surface_ros.decay.delay.impulses import find_impulses
 from limit_surface_ros.decay.delay.kernel import memory_kernel
 from limit_surface_ros.decay.delay.roots import count_roots, first_roots, roots_in_box
 from limit_surface_ros.decay.delay.system import DelaySystem
-from limit_surface_ros.decay.exponential_sum import count_terms, real_basis
 from limit_surface_ros.decay.fit import fit_decay
+from limit_surface_ros.decay.grids import largest_error
 from limit_surface_ros.decay.minimax import orthonormal_basis, solve_minimax
-from limit_surface_ros.decay.rate_choice import predicted_error, take
-from limit_surface_ros.decay.response_fits import fit_response, largest_error
+from limit_surface_ros.decay.rates import predicted_error, take
 from limit_surface_ros.decay.targets import PiecewiseLinear
 
 END, HORIZON = 6.0, 19.0

@@ -26,9 +26,9 @@ from limit_surface_ros.decay import examples
 from limit_surface_ros.decay.delay.kernel import memory_kernel
 from limit_surface_ros.decay.delay.roots import roots_in_box
 from limit_surface_ros.decay.delay.system import DelaySystem
+from limit_surface_ros.decay.esprit import damped
 from limit_surface_ros.decay.fit import fit_decay
-from limit_surface_ros.decay.rate_choice import judged, take
-from limit_surface_ros.decay.rates_esprit import damped
+from limit_surface_ros.decay.rates import judged, take
 from limit_surface_ros.decay.targets import Target
 
 Method = Callable[[np.ndarray, float, int], np.ndarray]

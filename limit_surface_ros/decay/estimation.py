@@ -24,7 +24,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.checks import as_floats, as_positive
-from limit_surface_ros.decay.exponential_sum import ExponentialSum, real_basis
+from limit_surface_ros.decay.basis import real_basis
+from limit_surface_ros.decay.exponential_sum import ExponentialSum
 from limit_surface_ros.errors import RangeError
 
 if TYPE_CHECKING:

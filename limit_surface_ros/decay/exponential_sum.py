@@ -3,7 +3,8 @@
 
 A sum stands for x(t) = Re sum_k c_k exp(lambda_k t), t >= 0, with one rate of each conjugate pair
 (Im lambda_k >= 0). A real rate is one real term, a pair is two: exp(a t) cos(b t) and
-exp(a t) sin(b t). This module imports numpy only, so that a node may load it at start-up.
+exp(a t) sin(b t). A rate of 0 is a constant, to which the rest decays. This module imports numpy
+only, so that a node may load it at start-up.
 """
 
 from __future__ import annotations
@@ -11,85 +12,30 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
 from limit_surface_ros.checks import as_floats
-from limit_surface_ros.decay.level_search import LevelSearch
-from limit_surface_ros.errors import NotFiniteError, RangeError, ShapeError, UnstableError
+from limit_surface_ros.decay.basis import (
+    as_complexes,
+    as_rates,
+    coefficients_of_weights,
+    count_terms,
+    weights_of_coefficients,
+)
+from limit_surface_ros.decay.levels import VANISHED, LevelSearch
+from limit_surface_ros.errors import RangeError, ShapeError, UnstableError
 from limit_surface_ros.scratch import keep_scratch
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    from limit_surface_ros.checks import Bools, Floats
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.decay.basis import Complexes
 
-    Complexes: TypeAlias = NDArray[np.complex128]
-
-# exp(-VANISHED) is zero in double precision.
-VANISHED = 800.0
 # Exponentials that are evaluated at a time.
 BLOCK = 1 << 15
-
-
-def as_rates(rates: ArrayLike) -> Complexes:
-    """Return `rates` as a read-only complex array, one rate of each conjugate pair.
-
-    Args:
-        rates: Shape (m,), complex rates [1/s] with Im >= 0.
-
-    Raises:
-        ShapeError: The rates are not a list of at least one number.
-        NotFiniteError: A rate is NaN or infinite.
-        RangeError: A rate has a negative imaginary part.
-    """
-    array = _as_complexes("rates", rates)
-    if (array.imag < 0.0).any():
-        worst = array[array.imag < 0.0][0]
-        raise RangeError(
-            f"rates must hold one rate of each conjugate pair, the one with Im >= 0, got {worst}"
-        )
-    return array
-
-
-def count_terms(rates: Complexes) -> int:
-    """Return the number of real terms: one for each real rate, two for each pair."""
-    return len(rates) + int(np.count_nonzero(rates.imag))
-
-
-def real_basis(rates: Complexes, times: Floats) -> Floats:
-    """Return the real terms at the given times.
-
-    Args:
-        rates: Shape (m,), as `as_rates` returns them.
-        times: Shape (n,) [s].
-
-    Returns:
-        Shape (n, count_terms(rates)): for each rate in turn Re exp(lambda t) and, if it is
-        complex, -Im exp(lambda t). The weights of such a pair are the real and imaginary part of
-        its coefficient.
-    """
-    waves = np.exp(np.multiply.outer(times, rates))
-    columns = np.empty((len(times), 2 * len(rates)))
-    columns[:, 0::2] = waves.real
-    columns[:, 1::2] = -waves.imag
-    return columns[:, _used_columns(rates)]
-
-
-def coefficients_of_weights(rates: Complexes, weights: Floats) -> Complexes:
-    """Return the complex coefficients (m,) that weights (terms,) of `real_basis` stand for."""
-    columns = np.zeros(2 * len(rates))
-    columns[_used_columns(rates)] = weights
-    return columns[0::2] + 1j * columns[1::2]
-
-
-def weights_of_coefficients(rates: Complexes, coefficients: Complexes) -> Floats:
-    """Return the weights (terms,) of `real_basis` that complex coefficients (m,) stand for."""
-    columns = np.empty(2 * len(rates))
-    columns[0::2] = coefficients.real
-    columns[1::2] = coefficients.imag
-    return columns[_used_columns(rates)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,15 +64,15 @@ class ExponentialSum:
     def __post_init__(self) -> None:
         """Check both arrays and that they belong together, and make them read-only."""
         rates = as_rates(self.rates)
-        coefficients = _as_complexes("coefficients", self.coefficients)
+        coefficients = as_complexes("coefficients", self.coefficients)
         if rates.shape != coefficients.shape:
             raise ShapeError(
                 f"each rate needs one coefficient, got {len(rates)} rates and "
                 f"{len(coefficients)} coefficients"
             )
-        crooked = (rates.imag == 0.0) & (coefficients.imag != 0.0)
-        if crooked.any():
-            place = int(np.flatnonzero(crooked)[0])
+        not_real = (rates.imag == 0.0) & (coefficients.imag != 0.0)
+        if not_real.any():
+            place = int(np.flatnonzero(not_real)[0])
             raise RangeError(
                 f"the coefficient of a real rate must be real, got {coefficients[place]} "
                 f"for the rate {rates[place].real} at index {place}"
@@ -151,8 +97,25 @@ class ExponentialSum:
 
     @property
     def slowest_rate(self) -> float:
-        """Largest real part of the rates [1/s]; below 0 if x decays."""
+        """Largest real part of the rates [1/s]; below 0 if x decays to zero."""
         return float(self.rates.real.max())
+
+    @cached_property
+    def constant(self) -> float:
+        """Coefficient of the rate 0, in the unit of x: what is left when all else has decayed."""
+        return float(self.coefficients.real[self.rates == 0.0].sum())
+
+    @cached_property
+    def settles(self) -> bool:
+        """Whether all rates but 0 decay, so that x goes to its constant."""
+        return bool((self.rates.real[self.rates != 0.0] < 0.0).all())
+
+    def without_constant(self) -> ExponentialSum:
+        """Return what decays to the constant, x less its value at infinity."""
+        kept = self.rates != 0.0
+        if not kept.any():
+            return ExponentialSum.from_weights(np.array([-1.0 + 0.0j]), np.zeros(1))
+        return ExponentialSum(self.rates[kept], self.coefficients[kept])
 
     @cached_property
     def start(self) -> float:
@@ -229,25 +192,49 @@ class ExponentialSum:
 
         Returns:
             Time [s]; 0 if |x| never exceeds the level, infinity if no time is late enough
-            (the level is 0 and x is not).
+            (the level is not above the size of the constant, and x is not zero).
 
         Raises:
             RangeError: The level is negative or not a finite number.
-            UnstableError: A rate does not decay, so that no time can be named.
+            UnstableError: A rate other than 0 does not decay, so that no time can be named.
         """
         height = float(as_floats("level", level))
         if height < 0.0:
             raise RangeError(f"level must be at least 0, got {height}")
-        self._require_decay()
+        self._require_settling()
         if not self.coefficients.any():
             return 0.0
-        if height == 0.0:
+        if height <= abs(self.constant):
             return math.inf
-        return self._level_search.last_excess(height) or 0.0
+        return self._levels.last_excess(height) or 0.0
+
+    def supremum(self, start: float = 0.0) -> float:
+        """Return a number that |x| provably never exceeds from `start` on.
+
+        Args:
+            start: At least 0 [s].
+
+        Returns:
+            At most a thousandth above the supremum, in the unit of x, unless terms of opposite
+            sign cancel so far that this cannot be proven in a million steps.
+
+        Raises:
+            RangeError: The start is negative or not a finite number.
+            UnstableError: A rate other than 0 does not decay.
+
+        Example:
+            >>> round(ExponentialSum([-1.0, -2.0], [1.0, -1.0]).supremum(), 3)
+            0.25
+        """
+        since = float(as_floats("start", start))
+        if since < 0.0:
+            raise RangeError(f"start must be at least 0, got {since}")
+        self._require_settling()
+        return self._levels.supremum(since)
 
     @cached_property
-    def _level_search(self) -> LevelSearch:
-        return LevelSearch(self)
+    def _levels(self) -> LevelSearch:
+        return LevelSearch(self.rates, self.coefficients)
 
     def truncated(self, terms: int) -> ExponentialSum:
         """Return a sum of at most `terms` real terms, those with the largest coefficients.
@@ -265,11 +252,11 @@ class ExponentialSum:
             raise RangeError(f"terms must be at least 1, got {terms}")
         sizes = np.where(self.rates.imag == 0.0, 1, 2)
         kept: list[int] = []
-        room = terms
+        remaining = terms
         for index in np.argsort(-np.abs(self.coefficients), kind="stable"):
-            if sizes[index] <= room:
+            if sizes[index] <= remaining:
                 kept.append(int(index))
-                room -= int(sizes[index])
+                remaining -= int(sizes[index])
         if not kept:
             raise RangeError("one term cannot hold a conjugate pair: keep at least 2")
         chosen = np.sort(kept)
@@ -279,8 +266,8 @@ class ExponentialSum:
         flat = times.reshape(-1)
         keep_scratch(flat.size)
         values = np.empty(flat.shape)
-        slowest = self.slowest_rate
-        # All is zero by then; at 1e308 s, exp would make NaN of an infinite phase.
+        slowest = float(self.rates.real[self.rates != 0.0].max(initial=-math.inf))
+        # All but a constant is zero by then; at 1e308 s, an infinite phase would make it NaN.
         last = VANISHED / -slowest if slowest < 0.0 else math.inf
         # In blocks: the waves of a million times at once would be a gigabyte.
         step = max(1, BLOCK // len(self.rates))
@@ -290,33 +277,19 @@ class ExponentialSum:
             values[start : start + step] = (waves @ self.coefficients).real
         return values.reshape(times.shape)
 
+    def _require_settling(self) -> None:
+        if not self.settles:
+            self._refuse_growth()
+
     def _require_decay(self) -> None:
         if not self.slowest_rate < 0.0:
-            raise UnstableError(
-                f"the sum does not decay: its right-most rate has the real part "
-                f"{self.slowest_rate:g}, which must be below 0"
-            )
+            self._refuse_growth()
 
-
-def _used_columns(rates: Complexes) -> Bools:
-    """Mark which of the columns (real, imaginary) of each rate are terms, shape (2 m,)."""
-    used = np.ones(2 * len(rates), dtype=bool)
-    used[1::2] = rates.imag != 0.0
-    return used
-
-
-def _as_complexes(name: str, values: ArrayLike) -> Complexes:
-    try:
-        array = np.array(values, dtype=np.complex128)
-    except (TypeError, ValueError) as error:
-        raise ShapeError(f"{name} must be a list of numbers: {error}") from None
-    if array.ndim != 1 or array.size == 0:
-        raise ShapeError(f"{name} must have shape (m,) with m >= 1, got {array.shape}")
-    if not np.isfinite(array).all():
-        place = int(np.flatnonzero(~np.isfinite(array))[0])
-        raise NotFiniteError(f"{name} must be finite, got {array[place]} at index {place}")
-    array.setflags(write=False)
-    return array
+    def _refuse_growth(self) -> NoReturn:
+        raise UnstableError(
+            f"the sum does not decay: its right-most rate has the real part "
+            f"{self.slowest_rate:g}, which must be below 0"
+        )
 
 
 def _as_times(times: ArrayLike) -> Floats:

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from limit_surface_ros.checks import as_positive
+from limit_surface_ros.decay.basis import as_rates
+from limit_surface_ros.decay.coefficients import ResponseFit, fit_response
 from limit_surface_ros.decay.delay.rates import dde_rates
-from limit_surface_ros.decay.exponential_sum import as_rates
+from limit_surface_ros.decay.esprit import esprit_choices, esprit_rates
+from limit_surface_ros.decay.neutral import neutral_rates
+from limit_surface_ros.decay.noise import is_noisy
 from limit_surface_ros.decay.polish import polished_rates
-from limit_surface_ros.decay.rate_choice import RateChoice
-from limit_surface_ros.decay.rates_esprit import esprit_choices, esprit_rates
-from limit_surface_ros.decay.rates_neutral import neutral_rates
-from limit_surface_ros.decay.response_fits import ResponseFit, fit_response
-from limit_surface_ros.decay.smoothing import is_noisy
+from limit_surface_ros.decay.rates import RateChoice
 from limit_surface_ros.errors import LimitSurfaceError, RangeError, SolverError
 
 if TYPE_CHECKING:

@@ -140,7 +140,7 @@ class _Iterate:
         matrix[:rank, :rank] = scaled.T @ scaled
         matrix[:rank, rank] = matrix[rank, :rank] = -(self.columns.T @ tilt)
         matrix[rank, rank] = total.sum()
-        # Jacobi scaling and a whisper of damping keep late, nearly singular systems solvable.
+        # Late systems are nearly singular: scaling and a damped diagonal keep them solvable.
         diagonal = 1.0 / np.sqrt(np.diag(matrix))
         matrix *= diagonal[:, np.newaxis] * diagonal
         matrix[np.diag_indices(rank + 1)] += 1e-15
@@ -177,8 +177,8 @@ class _Iterate:
         after = self.duals + constant
         side = np.append(-self.columns.T @ (after[0] - after[1]), float(after.sum()) - 1.0)
         unknowns = diagonal * linalg.cho_solve(factor, diagonal * side, check_finite=False)
-        bend = self.columns @ unknowns[:-1]
-        slacks = np.stack([unknowns[-1] - bend, unknowns[-1] + bend])
+        fitted = self.columns @ unknowns[:-1]
+        slacks = np.stack([unknowns[-1] - fitted, unknowns[-1] + fitted])
         return unknowns, slacks, constant - ratios * slacks
 
     def _lengths(self, direction: tuple[Floats, Floats, Floats]) -> tuple[float, float]:
@@ -186,6 +186,6 @@ class _Iterate:
         lengths = []
         for now, change in ((self.slacks, direction[1]), (self.duals, direction[2])):
             falling = change < 0.0
-            room = float((-now[falling] / change[falling]).min(initial=np.inf))
-            lengths.append(min(1.0, 0.995 * room))
+            limit = float((-now[falling] / change[falling]).min(initial=np.inf))
+            lengths.append(min(1.0, 0.995 * limit))
         return lengths[0], lengths[1]

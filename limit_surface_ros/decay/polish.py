@@ -15,20 +15,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.decay.exponential_sum import (
-    ExponentialSum,
-    coefficients_of_weights,
-    count_terms,
-    real_basis,
-)
+from limit_surface_ros.decay.basis import coefficients_of_weights, count_terms, real_basis
+from limit_surface_ros.decay.exponential_sum import ExponentialSum
+from limit_surface_ros.decay.grids import fit_times
 from limit_surface_ros.decay.minimax import solve_minimax
-from limit_surface_ros.decay.rate_choice import RateChoice, judged
-from limit_surface_ros.decay.response_fits import fit_times
+from limit_surface_ros.decay.rates import RateChoice, judged
 from limit_surface_ros.errors import SolverError
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Bools, Floats
-    from limit_surface_ros.decay.exponential_sum import Complexes
+    from limit_surface_ros.decay.basis import Complexes
     from limit_surface_ros.decay.targets import Target
 
 # The radius of the trust region is in parts of the rates' mobility, without a unit: of a step at

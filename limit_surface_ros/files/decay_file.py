@@ -16,6 +16,7 @@ A file is YAML::
     norm: inf
     max_error: 0.0282                  # in the unit of x
     rates: [[-2.05, 0.51], ...]        # [re, im] [1/s], one of each conjugate pair (im >= 0)
+                                       # the rate [0, 0] is a constant, to which x decays
     coefficients: [[0.31, -0.2], ...]  # x(t) = Re sum c exp(lambda t)
 """
 
@@ -48,7 +49,7 @@ class DecayModel:
 
     Attributes:
         name: By which programs ask for it.
-        sum: The function x(t); it decays.
+        sum: The function x(t); it decays to zero, or to a constant if a rate is 0.
         time_span: Start and end [s] of the interval on which `max_error` holds.
         norm: What the coefficients minimise: "inf", "2", "1" or a name of the analyst's own.
         max_error: Largest |x - response| on the time span, in the unit of x.
@@ -77,10 +78,10 @@ class DecayModel:
             raise RangeError(f"time_span must be 0 <= start < end, got {start} and {end}")
         if not 0.0 <= self.max_error < float("inf"):
             raise RangeError(f"max_error must be finite and at least 0, got {self.max_error}")
-        if not self.sum.slowest_rate < 0.0:
+        if not self.sum.settles:
             raise RangeError(
                 f"a decay model must decay: its right-most rate has the real part "
-                f"{self.sum.slowest_rate:g}, which must be below 0"
+                f"{self.sum.slowest_rate:g}, which must be below 0 (the rate 0 is a constant)"
             )
         object.__setattr__(self, "time_span", (start, end))
         object.__setattr__(self, "max_error", float(self.max_error))
@@ -108,7 +109,7 @@ def read_decay_model(path: str | Path) -> DecayModel:
     x = place_errors(top, "rates", lambda: ExponentialSum(rates, coefficients))
     model: DecayModel = place_errors(
         top,
-        "rates" if x.slowest_rate >= 0.0 else "time_span",
+        "time_span" if x.settles else "rates",
         lambda: DecayModel(name, x, (span[0], span[1]), norm, max_error, system, fit),
     )
     return model

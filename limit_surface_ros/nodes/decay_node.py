@@ -266,9 +266,9 @@ class DecayNode(ModelNode[DecayModel]):
         twist, load_factor = load.surface.twist_and_load_factor(load.vector)
         factor = float(load_factor)
         stop = predict_stop(model.sum, factor, model.max_error)
-        times = np.linspace(
-            0.0, max(self.values["horizon"], stop.time), self.values["forecast_points"]
-        )
+        # A load that goes to a constant may never let the body rest.
+        end = max(self.values["horizon"], stop.time if np.isfinite(stop.time) else 0.0)
+        times = np.linspace(0.0, end, self.values["forecast_points"])
         response.slides = stop.slides
         response.load_factor = factor
         response.stop_time = stop.time

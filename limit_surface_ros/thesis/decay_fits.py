@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limit_surface_ros.decay.basis import count_terms
 from limit_surface_ros.decay.coefficients import fit_coefficients
 from limit_surface_ros.decay.examples import example
-from limit_surface_ros.decay.exponential_sum import count_terms
 from limit_surface_ros.decay.fit import fit_decay
-from limit_surface_ros.decay.rate_choice import LAW
-from limit_surface_ros.decay.response_fits import largest_error
+from limit_surface_ros.decay.grids import largest_error
+from limit_surface_ros.decay.rates import BERNSTEIN_RATE_CONSTANT
 from limit_surface_ros.plots.canvas import BLUE, GREY, SKY, VERMILION, line_style, new_figure
 from limit_surface_ros.thesis.decay_system import MAX_DELAY, root_table, roots_of
 from limit_surface_ros.thesis.findings import Claim, Findings, Study
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.decay.basis import Complexes
     from limit_surface_ros.decay.coefficients import CoefficientFit
-    from limit_surface_ros.decay.exponential_sum import Complexes
     from limit_surface_ros.decay.fit import DecayFit
     from limit_surface_ros.thesis.findings import Table
     from limit_surface_ros.thesis.settings import Settings
@@ -178,7 +178,7 @@ def _comparison(settings: Settings) -> dict[str, list[float]]:
             else other_fit(method, n).fit.max_error
             for n in terms
         ]
-    rows["law 0.0446 J T / N, T = 6 s"] = [LAW * MAX_DELAY / n for n in terms]
+    rows["law 0.0446 J T / N, T = 6 s"] = [BERNSTEIN_RATE_CONSTANT * MAX_DELAY / n for n in terms]
     return rows
 
 

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.decay.basis import Complexes
     from limit_surface_ros.decay.delay.impulses import Impulses
     from limit_surface_ros.decay.delay.kernel import MemoryKernel
-    from limit_surface_ros.decay.exponential_sum import Complexes
     from limit_surface_ros.thesis.findings import Table
     from limit_surface_ros.thesis.settings import Settings
     from limit_surface_ros.thesis.store import Store

@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.decay.exponential_sum import Complexes, ExponentialSum
+    from limit_surface_ros.decay.basis import Complexes
+    from limit_surface_ros.decay.exponential_sum import ExponentialSum
     from limit_surface_ros.thesis.settings import Settings
     from limit_surface_ros.thesis.store import Store
 

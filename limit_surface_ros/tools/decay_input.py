@@ -11,7 +11,7 @@ import numpy as np
 
 from limit_surface_ros.checks import as_positive
 from limit_surface_ros.decay.examples import EXAMPLES, example
-from limit_surface_ros.decay.smoothing import resting_level
+from limit_surface_ros.decay.noise import resting_level
 from limit_surface_ros.decay.targets import Record
 from limit_surface_ros.errors import DataError, FileError, RangeError
 from limit_surface_ros.files.bag_reader import read_topic

@@ -21,8 +21,8 @@ from limit_surface_ros import __version__
 from limit_surface_ros.decay.coefficients import NORMS
 from limit_surface_ros.decay.examples import EXAMPLES as RESPONSES
 from limit_surface_ros.decay.fit import METHODS, Options, fit_decay
-from limit_surface_ros.decay.response_fits import largest_error
-from limit_surface_ros.decay.smoothing import resting_level
+from limit_surface_ros.decay.grids import largest_error
+from limit_surface_ros.decay.noise import resting_level
 from limit_surface_ros.decay.targets import Record
 from limit_surface_ros.files.decay_file import DecayModel, write_decay_model
 from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
@@ -200,7 +200,7 @@ def report(result: DecayFit, given: DecayInput) -> None:
         print(f"{label:<11} {value}")
 
 
-def history(result: DecayFit, given: DecayInput) -> dict[str, Any]:
+def provenance(result: DecayFit, given: DecayInput) -> dict[str, Any]:
     """Return how the model came about, for its file."""
     fit, choice = result.fit, result.choice
     values: dict[str, Any] = {
@@ -237,7 +237,7 @@ def model_of(result: DecayFit, given: DecayInput, name: str) -> DecayModel:
         norm=result.fit.norm,
         max_error=result.fit.max_error,
         system=result.choice.system,
-        fit=history(result, given),
+        fit=provenance(result, given),
     )
 
 

@@ -8,14 +8,14 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from limit_surface_ros.decay import examples
-from limit_surface_ros.decay.coefficients import fit_coefficients
+from limit_surface_ros.decay.basis import real_basis
+from limit_surface_ros.decay.coefficients import fit_coefficients, fit_response
 from limit_surface_ros.decay.delay.construction import system_of_kernel
 from limit_surface_ros.decay.delay.impulses import find_impulses
 from limit_surface_ros.decay.delay.kernel import memory_kernel
 from limit_surface_ros.decay.delay.roots import first_roots
-from limit_surface_ros.decay.exponential_sum import real_basis
+from limit_surface_ros.decay.grids import largest_error
 from limit_surface_ros.decay.minimax import solve_minimax
-from limit_surface_ros.decay.response_fits import fit_response, largest_error
 from limit_surface_ros.errors import RangeError, ShapeError
 
 seeds = st.integers(min_value=0, max_value=2**32 - 1)

@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from limit_surface_ros.decay.basis import real_basis
 from limit_surface_ros.decay.estimation import CoefficientEstimator, EstimationOptions
-from limit_surface_ros.decay.exponential_sum import ExponentialSum, real_basis
+from limit_surface_ros.decay.exponential_sum import ExponentialSum
 from limit_surface_ros.errors import NotFiniteError, RangeError
 
 seeds = st.integers(min_value=0, max_value=2**32 - 1)

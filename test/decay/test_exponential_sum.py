@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from limit_surface_ros.decay.exponential_sum import ExponentialSum, real_basis
+from limit_surface_ros.decay.basis import real_basis
+from limit_surface_ros.decay.exponential_sum import ExponentialSum
 from limit_surface_ros.errors import NotFiniteError, RangeError, ShapeError, UnstableError
 
 seeds = st.integers(min_value=0, max_value=2**32 - 1)
@@ -187,3 +188,62 @@ def test_importing_a_sum_imports_no_scipy():
         "sys.exit(any(name.startswith('scipy') for name in sys.modules))"
     )
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
+
+
+def test_a_rate_of_zero_is_a_constant():
+    x = ExponentialSum([0.0, -1.0, -2.0 + 3.0j], [0.25, 1.0, 0.5 - 0.25j])
+    t = np.linspace(0.0, 9.0, 91)
+    expected = 0.25 + np.exp(-t) + (0.5 - 0.25j) * np.exp((-2.0 + 3.0j) * t)
+    np.testing.assert_allclose(x(t), expected.real, rtol=1e-14)
+    assert (x.constant, x.settles, x.terms) == (0.25, True, 4)
+    assert not ExponentialSum([0.0, 2.0j], [1.0, 1.0]).settles
+    np.testing.assert_allclose(x.without_constant()(t), x(t) - 0.25, atol=1e-15)
+    assert float(x(1e308)) == 0.25
+
+
+def test_levels_above_a_constant_are_reached_and_others_never():
+    x = ExponentialSum([0.0, -1.0], [0.25, 1.0])
+    assert x.time_to_level(0.5) == pytest.approx(np.log(4.0), rel=1e-12)
+    assert x.time_to_level(0.25) == np.inf
+    assert x.time_to_level(0.1) == np.inf
+    assert x.time_to_level(1.5) == 0.0
+    # From below, through zero: |x| was last above 0.5 at ln 2.
+    assert ExponentialSum([0.0, -1.0], [0.25, -1.5]).time_to_level(0.5) == pytest.approx(
+        np.log(2.0), rel=1e-12
+    )
+
+
+@pytest.mark.parametrize(
+    ("rates", "coefficients", "start", "supremum"),
+    [
+        ([-1.0, -2.0], [1.0, -1.0], 0.0, 0.25),
+        ([-1.0, -2.0], [1.0, -1.0], 1.0, np.exp(-1.0) - np.exp(-2.0)),
+        ([-1.0], [-2.0], 3.0, 2.0 * np.exp(-3.0)),
+        ([0.0, -1.0], [-0.5, 1.0], 2.0, 0.5),
+        ([0.0], [0.0], 2.0, 0.0),
+    ],
+)
+def test_suprema_are_proven_to_a_thousandth(rates, coefficients, start, supremum):
+    found = ExponentialSum(rates, coefficients).supremum(start)
+    assert supremum * (1.0 - 1e-15) <= found <= supremum * 1.0011
+
+
+@given(st.integers(0, 10_000))
+def test_no_value_is_above_the_supremum(seed):
+    random = np.random.default_rng(seed)
+    real = -(10.0 ** random.uniform(-2.0, 2.0, 4))
+    rates = real + 1j * np.where(random.uniform(size=4) < 0.5, 0.0, 10.0 * random.uniform(size=4))
+    coefficients = random.normal(size=4) + 1j * random.normal(size=4) * (rates.imag > 0.0)
+    x = ExponentialSum(rates, coefficients)
+    start = random.uniform(0.0, 2.0)
+    times = start + np.append(np.linspace(0.0, 1.0, 5000), np.geomspace(1.0, 1e3, 5000))
+    highest = np.abs(x(times)).max()
+    found = x.supremum(start)
+    assert highest <= found <= 1.0011 * highest + 1e-3 * found
+
+
+def test_a_supremum_needs_a_sum_that_settles():
+    with pytest.raises(UnstableError):
+        ExponentialSum([0.1], [1.0]).supremum()
+    with pytest.raises(RangeError):
+        ExponentialSum([-0.1], [1.0]).supremum(-1.0)

@@ -11,7 +11,7 @@ from limit_surface_ros.decay.delay.closed_kernel import ClosedKernel
 from limit_surface_ros.decay.delay.construction import delay_system, system_of_kernel
 from limit_surface_ros.decay.delay.impulses import find_impulses
 from limit_surface_ros.decay.delay.kernel import divide_series, memory_kernel
-from limit_surface_ros.decay.smoothing import noise_level, smoothed
+from limit_surface_ros.decay.noise import noise_level, smoothed
 from limit_surface_ros.decay.targets import Analytic, PiecewiseLinear, uniform_times
 from limit_surface_ros.errors import DataError, NotFiniteError, RangeError, ShapeError
 

@@ -9,13 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from limit_surface_ros.decay import examples
+from limit_surface_ros.decay.coefficients import fit_response
 from limit_surface_ros.decay.delay.construction import delay_system
 from limit_surface_ros.decay.delay.roots import first_roots
+from limit_surface_ros.decay.esprit import esprit
 from limit_surface_ros.decay.fit import Options, fit_decay
-from limit_surface_ros.decay.rate_choice import predicted_error, take
-from limit_surface_ros.decay.rates_esprit import esprit
-from limit_surface_ros.decay.rates_neutral import neutral_rates, neutral_roots
-from limit_surface_ros.decay.response_fits import fit_response, largest_error
+from limit_surface_ros.decay.grids import largest_error
+from limit_surface_ros.decay.neutral import neutral_rates, neutral_roots
+from limit_surface_ros.decay.rates import predicted_error, take
 from limit_surface_ros.decay.targets import PiecewiseLinear, Record
 from limit_surface_ros.errors import LimitSurfaceError, RangeError, ShapeError, UnstableError
 

@@ -131,5 +131,6 @@ def test_bad_numbers_are_refused(load_factor, max_error, error):
 
 
 def test_a_load_that_does_not_die_away_never_lets_the_body_rest():
+    assert predict_stop(ExponentialSum([0.0], [1.0]), 2.0).time == math.inf
     with pytest.raises(UnstableError, match="does not decay"):
-        predict_stop(ExponentialSum([0.0], [1.0]), 2.0)
+        predict_stop(ExponentialSum([0.1], [1.0]), 2.0)

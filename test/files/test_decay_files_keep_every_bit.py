@@ -126,7 +126,7 @@ def test_a_bad_file_is_refused_with_file_key_and_reason(tmp_path, key, value, me
         ({"name": " "}, "name"),
         ({"time_span": (1.0, 1.0)}, "time_span"),
         ({"max_error": float("nan")}, "max_error"),
-        ({"sum": ExponentialSum([0.0], [1.0])}, "must decay"),
+        ({"sum": ExponentialSum([0.1], [1.0])}, "must decay"),
     ],
 )
 def test_a_model_that_makes_no_sense_is_refused(change, message):
@@ -141,3 +141,11 @@ def test_reading_decay_models_imports_no_scipy():
         "sys.exit(any(name.startswith('scipy') for name in sys.modules))"
     )
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
+
+
+def test_a_model_that_decays_to_a_constant_is_kept(tmp_path):
+    x = ExponentialSum([0.0, -1.0], [0.25, 1.0])
+    write_decay_model(DecayModel("creep", x, (0.0, 6.0), "2", 0.1), tmp_path / "model.yaml")
+    back = read_decay_model(tmp_path / "model.yaml").sum
+    assert back.constant == 0.25
+    assert back.time_to_level(0.5) == x.time_to_level(0.5)

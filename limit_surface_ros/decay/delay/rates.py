@@ -15,13 +15,13 @@ import numpy as np
 from limit_surface_ros.decay.delay.construction import delay_system
 from limit_surface_ros.decay.delay.roots import first_roots, roots_in_box
 from limit_surface_ros.decay.delay.stability import require_minimum_phase, require_stable
-from limit_surface_ros.decay.rate_choice import RateChoice, judged, take
-from limit_surface_ros.decay.smoothing import settling_time, smoothed
+from limit_surface_ros.decay.noise import settling_time, smoothed
+from limit_surface_ros.decay.rates import RateChoice, judged, take
 from limit_surface_ros.errors import DataError, RangeError, SolverError, UnstableError
 
 if TYPE_CHECKING:
+    from limit_surface_ros.decay.basis import Complexes
     from limit_surface_ros.decay.delay.system import DelaySystem
-    from limit_surface_ros.decay.exponential_sum import Complexes
     from limit_surface_ros.decay.targets import Target
 
 # Maximum delays tried, in settling times of the response; then around the best of them.

@@ -22,8 +22,8 @@ from limit_surface_ros.errors import RangeError, SolverError
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.decay.basis import Complexes
     from limit_surface_ros.decay.delay.system import DelaySystem
-    from limit_surface_ros.decay.exponential_sum import Complexes
 
 # Grid points for each distance 2 pi / T of neighbouring roots, at first and at most.
 FIRST_DENSITY, LAST_DENSITY = 4, 32
@@ -63,15 +63,15 @@ def roots_in_box(
     distance = _distance(system)
     for nudge in NUDGES:
         margin = nudge * distance
-        wide = (left - margin, right + margin)
-        tall = (max(0.0, low - margin), high + margin)
+        real_range = (left - margin, right + margin)
+        imag_range = (max(0.0, low - margin), high + margin)
         try:
-            expected = count_zeros(system.characteristic, wide, tall, 0.1 * distance)
+            expected = count_zeros(system.characteristic, real_range, imag_range, 0.1 * distance)
         except SolverError:
             if nudge == NUDGES[-1]:
                 raise
             continue
-        roots = _find(system, wide, tall, expected)
+        roots = _find(system, real_range, imag_range, expected)
         slack = 1e-9 * (1.0 + np.abs(roots))
         inside = (roots.real >= left - slack) & (roots.real <= right + slack)
         inside &= (roots.imag >= low - slack) & (roots.imag <= high + slack)

@@ -14,8 +14,8 @@ from limit_surface_ros.decay.targets import PiecewiseLinear
 from limit_surface_ros.errors import DataError, SolverError, UnstableError
 
 if TYPE_CHECKING:
+    from limit_surface_ros.decay.basis import Complexes
     from limit_surface_ros.decay.delay.system import DelaySystem
-    from limit_surface_ros.decay.exponential_sum import Complexes
     from limit_surface_ros.decay.targets import Target
 
 # Knots on which the transform of a response is computed.

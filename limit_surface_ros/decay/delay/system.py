@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.decay.exponential_sum import Complexes
+    from limit_surface_ros.decay.basis import Complexes
 
 # Rates that are evaluated at a time: their waves fit into the cache.
 BLOCK = 4096

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.decay.exponential_sum import Complexes
+    from limit_surface_ros.decay.basis import Complexes
 
 # Between two samples the phase may turn by this much [rad], and the modulus change by this factor.
 MOST_TURN, MOST_CHANGE = 0.7, 3.0

@@ -20,8 +20,8 @@ import numpy as np
 from scipy import linalg
 
 from limit_surface_ros.checks import as_floats, as_positive
-from limit_surface_ros.decay.rate_choice import RateChoice, judged, take
-from limit_surface_ros.decay.smoothing import settling_time
+from limit_surface_ros.decay.noise import settling_time
+from limit_surface_ros.decay.rates import RateChoice, judged, take
 from limit_surface_ros.decay.targets import Record, uniform_times
 from limit_surface_ros.errors import DataError, RangeError, ShapeError, SolverError
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.decay.exponential_sum import Complexes
+    from limit_surface_ros.decay.basis import Complexes
     from limit_surface_ros.decay.targets import Target
 
 SAMPLES = 1001

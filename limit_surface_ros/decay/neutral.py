@@ -15,14 +15,10 @@ import numpy as np
 from scipy import optimize
 
 from limit_surface_ros.checks import as_positive
-from limit_surface_ros.decay.exponential_sum import as_rates, count_terms
-from limit_surface_ros.decay.rate_choice import (
-    RateChoice,
-    judged,
-    predicted_error,
-)
-from limit_surface_ros.decay.response_fits import fit_response
-from limit_surface_ros.decay.smoothing import settling_time, smoothed
+from limit_surface_ros.decay.basis import as_rates, count_terms
+from limit_surface_ros.decay.coefficients import fit_response
+from limit_surface_ros.decay.noise import settling_time, smoothed
+from limit_surface_ros.decay.rates import RateChoice, judged, predicted_error
 from limit_surface_ros.decay.targets import largest_slope_jump
 from limit_surface_ros.errors import RangeError, SolverError
 
@@ -30,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.decay.exponential_sum import Complexes
+    from limit_surface_ros.decay.basis import Complexes
     from limit_surface_ros.decay.targets import Target
 
 FIRST_LENGTHS = (1.05, 1.2, 1.4, 1.7)

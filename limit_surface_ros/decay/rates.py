@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.decay.exponential_sum import as_rates
-from limit_surface_ros.decay.response_fits import fit_response
+from limit_surface_ros.decay.basis import as_rates
+from limit_surface_ros.decay.coefficients import fit_response
 
 if TYPE_CHECKING:
+    from limit_surface_ros.decay.basis import Complexes
     from limit_surface_ros.decay.delay.system import DelaySystem
-    from limit_surface_ros.decay.exponential_sum import Complexes
     from limit_surface_ros.decay.targets import Target
 
 # 0.28017 / (2 pi): Bernstein's constant of the approximation of |x|, and the density of rates.
-LAW = 0.28017 / (2.0 * np.pi)
+BERNSTEIN_RATE_CONSTANT = 0.28017 / (2.0 * np.pi)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,12 +61,12 @@ def take(rates: Complexes, terms: int) -> Complexes:
     reached where there is a real rate.
     """
     kept = []
-    room = terms
+    remaining = terms
     for rate in rates:
         size = 1 if rate.imag == 0.0 else 2
-        if size <= room:
+        if size <= remaining:
             kept.append(rate)
-            room -= size
+            remaining -= size
     return np.array(kept, dtype=np.complex128)
 
 
@@ -82,4 +82,4 @@ def predicted_error(slope_jump: float, max_delay: float, terms: int) -> float:
         max_delay: T [s].
         terms: N.
     """
-    return LAW * abs(slope_jump) * max_delay / terms
+    return BERNSTEIN_RATE_CONSTANT * abs(slope_jump) * max_delay / terms
