@@ -15,7 +15,7 @@ import numpy as np
 
 from limit_surface_ros.checks import as_floats
 from limit_surface_ros.decay.estimation import CoefficientEstimator
-from limit_surface_ros.decay.stopping import onset_value
+from limit_surface_ros.errors import NoOnsetError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -26,6 +26,21 @@ if TYPE_CHECKING:
 
 # Of the estimate, in bounds.
 STANDARD_DEVIATIONS = 3.0
+# x(0) below this share of the sum of |c| is rounding and no value to scale by.
+SMALLEST_START = 1e-12
+
+
+def onset_value(x: ExponentialSum) -> float:
+    """Return x(0), by which a response is scaled to its onset.
+
+    Raises:
+        NoOnsetError: x(0) is zero, so that x(t) / x(0) has no meaning.
+    """
+    if not abs(x.start) > SMALLEST_START * x.size:
+        raise NoOnsetError(
+            f"the decay model starts at x(0) = {x.start:g}: it cannot be scaled to an onset"
+        )
+    return x.start
 
 
 class Response:

@@ -12,10 +12,11 @@ from limit_surface_interfaces.msg import DecayForecast
 from limit_surface_interfaces.srv import EvaluateDecay, ListDecays, PredictStop, TimeToLevel
 
 from limit_surface_ros.decay.estimation import EstimationOptions
-from limit_surface_ros.decay.stopping import onset_value, predict_stop
+from limit_surface_ros.decay.response import onset_value
 from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.decay_file import DecayModel, read_decay_model
 from limit_surface_ros.files.surface_file import read_surface_model
+from limit_surface_ros.motion.holding import predict_stop
 from limit_surface_ros.nodes import convert, frames, planar_inputs, spin
 from limit_surface_ros.nodes.model_host import model_settings
 from limit_surface_ros.nodes.model_info import Listing, decay_info

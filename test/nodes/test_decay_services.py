@@ -17,7 +17,7 @@ from std_srvs.srv import Trigger
 
 from decay_helpers import SUM, SURFACE, Bench, write_decay
 from limit_surface_ros.decay.exponential_sum import ExponentialSum
-from limit_surface_ros.decay.stopping import predict_stop
+from limit_surface_ros.motion.holding import predict_stop
 from node_helpers import STAMP, planar_twist, wrench_message
 
 FADING = ExponentialSum([-0.7], [2.0])

@@ -15,13 +15,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.checks import as_floats
-from limit_surface_ros.errors import NoOnsetError, RangeError
+from limit_surface_ros.decay.response import onset_value
+from limit_surface_ros.errors import RangeError
 
 if TYPE_CHECKING:
     from limit_surface_ros.decay.exponential_sum import ExponentialSum
 
-# x(0) below this share of the sum of |c| is rounding and no value to scale by.
-SMALLEST_START = 1e-12
 # Level of rest of a load factor so small that its inverse overflows.
 _LARGEST = float(np.finfo(np.float64).max)
 
@@ -42,19 +41,6 @@ class Stop:
     earliest: float
     latest: float
     slides: bool
-
-
-def onset_value(x: ExponentialSum) -> float:
-    """Return x(0), by which a response is scaled to its onset.
-
-    Raises:
-        NoOnsetError: x(0) is zero, so that x(t) / x(0) has no meaning.
-    """
-    if not abs(x.start) > SMALLEST_START * x.size:
-        raise NoOnsetError(
-            f"the decay model starts at x(0) = {x.start:g}: it cannot be scaled to an onset"
-        )
-    return x.start
 
 
 def predict_stop(x: ExponentialSum, load_factor: float, max_error: float = 0.0) -> Stop:

@@ -9,8 +9,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from limit_surface_ros.decay.exponential_sum import ExponentialSum
-from limit_surface_ros.decay.stopping import predict_stop
 from limit_surface_ros.errors import NoOnsetError, NotFiniteError, RangeError, UnstableError
+from limit_surface_ros.motion.holding import predict_stop
 
 seeds = st.integers(min_value=0, max_value=2**32 - 1)
 GRID = 400_001
