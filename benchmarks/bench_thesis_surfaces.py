@@ -30,13 +30,13 @@ from limit_surface_ros.fitting.result import FitResult
 from limit_surface_ros.fitting.search import Search, process_pool
 from limit_surface_ros.fitting.second_approximation import fit_second_approximation
 from limit_surface_ros.fitting.simulation import simulated_pairs
+from limit_surface_ros.surface.base import LimitSurface
 from limit_surface_ros.surface.contact import shapes
 from limit_surface_ros.surface.contact.patch import ContactPatch
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.kinds.power_sum import thesis_exponents
 from limit_surface_ros.surface.measures import force_error, load_error, quantiles
 from limit_surface_ros.surface.pairs import Pairs
-from limit_surface_ros.surface.protocol import LimitSurface
 from limit_surface_ros.surface.sampling import random_directions, random_motions
 from limit_surface_ros.surface.scaling import Scaling
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.surface.base import LimitSurface
 
 SOURCE = Path(__file__).with_name("c_maps.c")
 FLAGS = ["-O3", "-march=native", "-shared", "-fPIC"]

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.surface.base import LimitSurface
 
 SCHEMA = 1
 # Scales [m], [N] beyond this and its reciprocal would take answers out of the range of numbers.

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.surface.base import LimitSurface
 
 
 class Objective(Protocol):

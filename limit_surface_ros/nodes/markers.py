@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.files.surface_file import SurfaceModel
-    from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.surface.base import LimitSurface
 
 # The palette of Okabe and Ito, told apart with any kind of colour vision.
 BLUE = (0.0, 0.447, 0.698)

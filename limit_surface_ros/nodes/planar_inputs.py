@@ -10,8 +10,7 @@ import numpy as np
 from limit_surface_ros.errors import RangeError
 from limit_surface_ros.nodes import convert
 from limit_surface_ros.nodes.settings import Setting
-from limit_surface_ros.surface.frames import RigidTransform
-from limit_surface_ros.surface.planar import out_of_plane, planar
+from limit_surface_ros.surface.frames import RigidTransform, out_of_plane, planar
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     from limit_surface_ros.files.surface_file import SurfaceModel
     from limit_surface_ros.nodes.frames import Frames
     from limit_surface_ros.nodes.parameters import Parameters
-    from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.surface.base import LimitSurface
 
 SETTINGS = (
     Setting(

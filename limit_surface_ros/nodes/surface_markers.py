@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.files.surface_file import SurfaceModel
     from limit_surface_ros.nodes.model_node import ModelNode
-    from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.surface.base import LimitSurface
 
 TOPIC = "surface"
 SETTINGS = (

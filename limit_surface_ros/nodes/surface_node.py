@@ -24,12 +24,12 @@ from limit_surface_ros.nodes.model_node import ModelNode
 from limit_surface_ros.nodes.planar_inputs import PlanarInputs
 from limit_surface_ros.nodes.settings import Setting
 from limit_surface_ros.nodes.surface_markers import SurfaceMarkers
-from limit_surface_ros.surface.planar import power
+from limit_surface_ros.surface.frames import power
 
 if TYPE_CHECKING:
     from std_msgs.msg import Header
 
-    from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.surface.base import LimitSurface
 
 NAME = "limit_surface"
 SETTINGS = (

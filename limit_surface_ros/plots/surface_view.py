@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from mpl_toolkits.mplot3d.axes3d import Axes3D
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.surface.base import LimitSurface
 
 LOAD_LABELS = ("$f_x$ [N]", "$f_y$ [N]", r"$\tau_z$ [N m]")
 # The two components that span each section; the third is zero there.

@@ -5,12 +5,12 @@ The kinds of surface and what they are made from and judged by are imported from
 from its own module.
 """
 
+from limit_surface_ros.surface.base import LimitSurface
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.kinds.polynomial import Polynomial
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.pairs import Pairs
-from limit_surface_ros.surface.protocol import LimitSurface
 from limit_surface_ros.surface.scaling import Scaling
 
 __all__ = [

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What all kinds of surface share: validation, scaled variables, one vector or many.
 
+Wrenches are (fx, fy, tau_z) in [N, N, N m], applied *to* the body, about the model's reference
+point and in its frame. Twists are (vx, vy, omega_z) in [m/s, m/s, rad/s] of the body at that
+point. Their dot product is power.
+
 A kind implements its three maps on *scaled columns*: arrays of shape (3, m), contiguous by
 component, each column of size about one. This base takes what callers pass, of shape (..., 3) in
 physical units, to such columns in blocks that fit the processor's cache, and back.
@@ -32,11 +36,16 @@ if TYPE_CHECKING:
     from limit_surface_ros.surface.gauges.one_load import Vector
     from limit_surface_ros.surface.scaling import Scaling
 
-Self = TypeVar("Self", bound="ScaledSurface")
+Self = TypeVar("Self", bound="LimitSurface")
 
 
-class ScaledSurface(ABC):
-    """A limit surface defined in scaled variables; see `surface.protocol.LimitSurface`."""
+class LimitSurface(ABC):
+    """The boundary of the convex set of wrenches that dry friction can resist.
+
+    Attributes:
+        kind: Name of the kind, as model files give it.
+        scaling: Characteristic length [m] and friction force [N] that make it dimensionless.
+    """
 
     kind: ClassVar[str]
     scaling: Scaling

@@ -12,12 +12,11 @@ import numpy as np
 from limit_surface_ros.surface.gauges.power_sum import PowerGauge
 from limit_surface_ros.surface.kinds.polynomial import Polynomial
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
-from limit_surface_ros.surface.linalg import root_of
-from limit_surface_ros.surface.sphere import even_directions
+from limit_surface_ros.surface.linalg import even_directions, root_of
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.surface.base import LimitSurface
     from limit_surface_ros.surface.support.newton import Gauge
 
 # Directions of load that are looked at where no theorem decides.

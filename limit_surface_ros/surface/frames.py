@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wrenches and twists seen from another frame: rotated, and moved with the lever arm.
+"""Wrenches and twists seen from another frame, and the planar part of what a frame shows.
 
 Six-vectors here are (force, torque) and (linear, angular velocity), each about the origin of its
 frame: (fx, fy, fz, tau_x, tau_y, tau_z) and (vx, vy, vz, omega_x, omega_y, omega_z).
@@ -7,6 +7,7 @@ frame: (fx, fy, fz, tau_x, tau_y, tau_z) and (vx, vy, vz, omega_x, omega_y, omeg
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,8 @@ from limit_surface_ros.checks import as_floats
 from limit_surface_ros.errors import ShapeError, ZeroVectorError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
@@ -145,6 +148,46 @@ class RigidTransform:
         angular = array[..., 3:] @ self.rotation.T
         linear = array[..., :3] @ self.rotation.T + np.cross(self.translation, angular)
         return np.concatenate([linear, angular], axis=-1)
+
+
+def planar(six: Sequence[float]) -> tuple[float, float, float]:
+    """Return x, y and the turn about z of a wrench or twist.
+
+    Args:
+        six: (fx, fy, fz, tau_x, tau_y, tau_z) or (vx, vy, vz, omega_x, omega_y, omega_z).
+    """
+    return six[0], six[1], six[5]
+
+
+def out_of_plane(six: Sequence[float], length: float, *, pressing: bool = False) -> float:
+    """Return how large the left-out part is beside the planar part; 0 where there is none.
+
+    Turns are compared with translations through a length: torques are divided by it, angular
+    velocities multiplied.
+
+    Args:
+        six: A wrench or twist as for `planar`.
+        length: rho [m] for a twist, 1 / rho [1/m] for a wrench.
+        pressing: Whether z counts as used, as a pressing force does.
+    """
+    left_out = math.hypot(0.0 if pressing else six[2], six[3] * length, six[4] * length)
+    if left_out == 0.0:
+        return 0.0
+    return left_out / max(math.hypot(six[0], six[1], six[5] * length), 1e-300)
+
+
+def power(wrench: Floats, twist: Floats) -> Floats:
+    """Return the power wrench . twist [W].
+
+    Args:
+        wrench: Shape (..., 3), (fx, fy, tau_z) in [N, N, N m].
+        twist: Shape (..., 3), (vx, vy, omega_z) in [m/s, m/s, rad/s].
+
+    Returns:
+        Shape (...).
+    """
+    # By a product with ones: numpy adds up rows of three one by one.
+    return np.asarray(np.multiply(wrench, twist).dot(np.ones(3)))
 
 
 def _as_sixes(name: str, values: ArrayLike) -> Floats:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Positive semidefinite 3x3 matrices: validation, and factors that keep small values exact."""
+"""Small linear algebra: positive semidefinite 3x3 matrices, and directions on the unit sphere."""
 
 from __future__ import annotations
 
@@ -20,8 +20,10 @@ _TOLERANCE = 1e-10
 # Relative pivot below which a matrix has no further rank.
 _RANK_TOLERANCE = 8 * np.finfo(np.float64).eps
 
-# A form below this part of its trace is rounding: the load or motion is one it does not see.
-BLIND = 1e-28
+# A form v'Av below this part of trace(A) v'v is zero but for rounding: v is in A's null space.
+NULL_TOLERANCE = 1e-28
+
+_ONES = np.ones(3)
 
 
 def as_psd_matrices(name: str, matrices: ArrayLike) -> Floats:
@@ -109,3 +111,26 @@ def solve_symmetric(matrices: Floats, columns: Floats) -> Floats:
     z = (z - low_c * x - low_e * y) / last
     y = y / middle - low_e * z
     return np.array([x / a - low_b * y - low_c * z, y, z])
+
+
+def even_directions(count: int) -> Floats:
+    """Return `count` unit vectors on a Fibonacci spiral, shape (count, 3).
+
+    Each stands for an equal share of the sphere; neighbours are about sqrt(4 pi / count) apart.
+    """
+    index = np.arange(count)
+    z = (2.0 * index + 1.0) / count - 1.0
+    angle = np.pi * (1.0 + np.sqrt(5.0)) * index
+    radius = np.sqrt(1.0 - z * z)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
+
+
+def of_unit_length(columns: Floats) -> Floats:
+    """Return vectors (3, m), none zero, divided by their lengths."""
+    return np.asarray(columns / np.sqrt(squared_lengths(columns)))
+
+
+def squared_lengths(columns: Floats) -> Floats:
+    """Return the squared lengths (m,) of vectors (3, m)."""
+    # The quickest way for few and for many.
+    return np.asarray(_ONES.dot(columns * columns))

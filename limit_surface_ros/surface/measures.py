@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.base import LimitSurface
     from limit_surface_ros.surface.pairs import Pairs
-    from limit_surface_ros.surface.protocol import LimitSurface
     from limit_surface_ros.surface.scaling import Scaling
 
 

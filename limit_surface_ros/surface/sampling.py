@@ -12,8 +12,8 @@ from limit_surface_ros.surface.pairs import Pairs
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.base import LimitSurface
     from limit_surface_ros.surface.kinds.point_contacts import PointContacts
-    from limit_surface_ros.surface.protocol import LimitSurface
 
 
 def random_directions(count: int, rng: np.random.Generator | int | None = None) -> Floats:

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from limit_surface_ros.fitting.result import FitResult
+    from limit_surface_ros.surface.base import LimitSurface
     from limit_surface_ros.surface.kinds.point_contacts import PointContacts
-    from limit_surface_ros.surface.protocol import LimitSurface
     from limit_surface_ros.thesis.settings import Settings
     from limit_surface_ros.thesis.store import Store
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.surface.base import LimitSurface
     from limit_surface_ros.thesis.findings import Table
     from limit_surface_ros.thesis.settings import Settings
     from limit_surface_ros.thesis.store import Store

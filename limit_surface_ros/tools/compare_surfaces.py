@@ -54,8 +54,8 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.files.surface_file import SurfaceModel
+    from limit_surface_ros.surface.base import LimitSurface
     from limit_surface_ros.surface.pairs import Pairs
-    from limit_surface_ros.surface.protocol import LimitSurface
     from limit_surface_ros.tools.training_data import TrainingData
 
 EXAMPLES = """examples:

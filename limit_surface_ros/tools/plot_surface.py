@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.surface.base import LimitSurface
 
 # Loads that are simulated of a contact; of many points the facets are too small to be seen.
 MOTIONS, FACET_LOADS, FEW_POINTS = 1200, 60, 12

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from limit_surface_ros.errors import MatrixError, NotFiniteError, RangeError, ShapeError
 from limit_surface_ros.surface import measures, sampling
+from limit_surface_ros.surface.base import LimitSurface
 from limit_surface_ros.surface.kinds.power_sum import PowerSum, thesis_exponents
-from limit_surface_ros.surface.protocol import LimitSurface
 from limit_surface_ros.surface.scaling import Scaling
 
 seeds = st.integers(0, 2**32 - 1)

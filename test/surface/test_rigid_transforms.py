@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from limit_surface_ros.errors import NotFiniteError, ShapeError, ZeroVectorError
-from limit_surface_ros.surface.frames import RigidTransform
-from limit_surface_ros.surface.planar import out_of_plane, planar, power
+from limit_surface_ros.surface.frames import RigidTransform, out_of_plane, planar, power
 
 numbers = st.floats(-10.0, 10.0)
 sixes = st.lists(numbers, min_size=6, max_size=6).map(np.array)

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.fitting.search import Descent, Progress
+    from limit_surface_ros.surface.base import LimitSurface
     from limit_surface_ros.surface.kinds.point_contacts import PointContacts
-    from limit_surface_ros.surface.protocol import LimitSurface
     from limit_surface_ros.surface.scaling import Scaling
 
 # Terms that sum up a pressure: with more, predictions are no better and maps slower.

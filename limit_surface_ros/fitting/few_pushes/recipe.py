@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.fitting.objective import Objective
     from limit_surface_ros.fitting.search import Descent
+    from limit_surface_ros.surface.base import LimitSurface
     from limit_surface_ros.surface.kinds.point_contacts import PointContacts
-    from limit_surface_ros.surface.protocol import LimitSurface
     from limit_surface_ros.surface.scaling import Scaling
 
 Prior = Literal["none", "ellipsoid", "pressure", "support"]

@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.fitting.few_pushes.recipe import Recipe
     from limit_surface_ros.fitting.search import Progress
+    from limit_surface_ros.surface.base import LimitSurface
     from limit_surface_ros.surface.kinds.point_contacts import PointContacts
     from limit_surface_ros.surface.pairs import Pairs
-    from limit_surface_ros.surface.protocol import LimitSurface
     from limit_surface_ros.surface.scaling import Scaling
 
 

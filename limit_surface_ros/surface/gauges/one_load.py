@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from limit_surface_ros.surface.linalg import BLIND
+from limit_surface_ros.surface.linalg import NULL_TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,7 +39,7 @@ def one_load_terms(roots: Floats, exponents: Floats, unit: Floats) -> list[Term]
         unit: The wrench unit, shape (3,).
     """
     rows = (roots / unit).reshape(-1, 9)
-    least = BLIND * np.square(rows).sum(axis=1)
+    least = NULL_TOLERANCE * np.square(rows).sum(axis=1)
     return [
         (p, small, *row)
         for p, small, row in zip(exponents.tolist(), least.tolist(), rows.tolist(), strict=True)

@@ -47,5 +47,5 @@ class Dissipation(DissipationSurface):
         return self.matrices
 
     def with_friction_force(self, friction_force: float) -> Dissipation:
-        """Return the same body under another weight; see `ScaledSurface`."""
+        """Return the same body under another weight; see `LimitSurface`."""
         return replace(self, scaling=replace(self.scaling, friction_force=friction_force))

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.surface.base import ScaledSurface
+from limit_surface_ros.surface.base import LimitSurface
 from limit_surface_ros.surface.gauges.norm_sum import FormTerms
 from limit_surface_ros.surface.gauges.one_load import norm_gradient_of_one, one_load_terms
 from limit_surface_ros.surface.gauges.one_motion import OneMotion
-from limit_surface_ros.surface.linalg import root_of
-from limit_surface_ros.surface.sphere import even_directions, of_unit_length
+from limit_surface_ros.surface.linalg import even_directions, of_unit_length, root_of
 from limit_surface_ros.surface.support.solvers import ConvexInverse
 from limit_surface_ros.surface.support.tabulated import TabulatedInverse
 
@@ -38,7 +37,7 @@ _SMALLEST = 1e-100
 _LARGEST = 1e100
 
 
-class DissipationSurface(ScaledSurface):
+class DissipationSurface(LimitSurface):
     """What kinds share whose dissipation is a sum of norms, D(v) = sum_k sqrt(v' B_k v).
 
     The load of maximum dissipation is the gradient of D; at a kink, where the twist belongs to a

@@ -77,7 +77,7 @@ class PointContacts(DissipationSurface):
         object.__setattr__(self, "friction_limits", limits)
 
     def with_friction_force(self, friction_force: float) -> PointContacts:
-        """Return the same body under another weight; see `ScaledSurface`.
+        """Return the same body under another weight; see `LimitSurface`.
 
         Every friction limit grows in the ratio of the friction force scales.
         """

@@ -16,11 +16,11 @@ import numpy as np
 
 from limit_surface_ros.checks import as_floats, as_vectors
 from limit_surface_ros.errors import MatrixError, ShapeError
-from limit_surface_ros.surface.base import ScaledSurface
+from limit_surface_ros.surface.base import LimitSurface
 from limit_surface_ros.surface.gauges.one_quartic import OneQuartic
 from limit_surface_ros.surface.gauges.one_twist import wrench_of_one
+from limit_surface_ros.surface.linalg import even_directions, of_unit_length
 from limit_surface_ros.surface.scaling import Scaling
-from limit_surface_ros.surface.sphere import even_directions, of_unit_length
 from limit_surface_ros.surface.support.solvers import (
     ConvexInverse,
     FramedInverse,
@@ -54,7 +54,7 @@ _STARTS = 500
 
 
 @dataclass(frozen=True, eq=False)
-class Polynomial(ScaledSurface):
+class Polynomial(LimitSurface):
     """The surface P(f) = 1 of a polynomial that is homogeneous of degree four.
 
     Attributes:
@@ -93,7 +93,7 @@ class Polynomial(ScaledSurface):
             )
 
     def with_friction_force(self, friction_force: float) -> Polynomial:
-        """Return the same body under another weight; see `ScaledSurface`."""
+        """Return the same body under another weight; see `LimitSurface`."""
         return replace(self, scaling=replace(self.scaling, friction_force=friction_force))
 
     def value(self, load: ArrayLike) -> Floats:

@@ -12,7 +12,7 @@ import numpy as np
 
 from limit_surface_ros.checks import as_floats, as_vectors
 from limit_surface_ros.errors import RangeError, ShapeError
-from limit_surface_ros.surface.base import ScaledSurface
+from limit_surface_ros.surface.base import LimitSurface
 from limit_surface_ros.surface.gauges.one_load import (
     gauge_of_one,
     norm_gradient_of_one,
@@ -22,9 +22,14 @@ from limit_surface_ros.surface.gauges.one_load import (
 from limit_surface_ros.surface.gauges.one_power_sum import OnePowerSum
 from limit_surface_ros.surface.gauges.one_twist import wrench_of_one
 from limit_surface_ros.surface.gauges.power_scale import PowerScale, power_scale
-from limit_surface_ros.surface.linalg import BLIND, as_psd_matrices, root_of
+from limit_surface_ros.surface.linalg import (
+    NULL_TOLERANCE,
+    as_psd_matrices,
+    of_unit_length,
+    root_of,
+    squared_lengths,
+)
 from limit_surface_ros.surface.scaling import Scaling
-from limit_surface_ros.surface.sphere import of_unit_length, squared_lengths
 from limit_surface_ros.surface.support.power_sum import power_sum_inverse
 
 if TYPE_CHECKING:
@@ -55,7 +60,7 @@ def thesis_exponents(terms: int) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class PowerSum(ScaledSurface):
+class PowerSum(LimitSurface):
     """The surface H(f) = sum_i (f' A_i f)^p_i = 1 in scaled variables.
 
     One term with exponent 1 is the ellipsoid of Howe and Cutkosky (1996),
@@ -120,7 +125,7 @@ class PowerSum(ScaledSurface):
         return cls(array, np.full(len(array), 0.5), scaling or Scaling())
 
     def with_friction_force(self, friction_force: float) -> PowerSum:
-        """Return the same body under another weight; see `ScaledSurface`."""
+        """Return the same body under another weight; see `LimitSurface`."""
         return replace(self, scaling=replace(self.scaling, friction_force=friction_force))
 
     def value(self, load: ArrayLike) -> Floats:
@@ -285,7 +290,7 @@ class PowerSum(ScaledSurface):
         if np.abs(self._roots).any(axis=2).all():
             return None
         sizes: Floats = np.square(self._roots).sum(axis=(1, 2))[:, np.newaxis]
-        return BLIND * sizes
+        return NULL_TOLERANCE * sizes
 
     def _forms(self, images: Floats, loads: Floats) -> Floats:
         """Return f' A_i f, shape (k, m), from the images R_i f and the loads f."""

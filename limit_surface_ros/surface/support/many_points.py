@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limit_surface_ros.surface.sphere import of_unit_length
+from limit_surface_ros.surface.linalg import of_unit_length
 from limit_surface_ros.surface.support.newton import newton_moves, plane_basis
 
 if TYPE_CHECKING:

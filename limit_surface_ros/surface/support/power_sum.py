@@ -11,8 +11,7 @@ from limit_surface_ros.surface.gauges.norm_sum import FormTerms
 from limit_surface_ros.surface.gauges.one_power_sum import OnePowerSum
 from limit_surface_ros.surface.gauges.power_scale import power_scale
 from limit_surface_ros.surface.gauges.power_sum import PowerGauge
-from limit_surface_ros.surface.linalg import root_of
-from limit_surface_ros.surface.sphere import even_directions
+from limit_surface_ros.surface.linalg import even_directions, root_of
 from limit_surface_ros.surface.support.one_by_one import OneByOne
 from limit_surface_ros.surface.support.solvers import (
     ConvexInverse,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 
-from limit_surface_ros.surface.sphere import even_directions, of_unit_length
+from limit_surface_ros.surface.linalg import even_directions, of_unit_length
 from limit_surface_ros.surface.support.newton import Gauge, certain_minimum, plane_minimum
 
 if TYPE_CHECKING:

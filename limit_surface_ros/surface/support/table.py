@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from limit_surface_ros.surface.sphere import squared_lengths
+from limit_surface_ros.surface.linalg import squared_lengths
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Bools, Floats, Places
