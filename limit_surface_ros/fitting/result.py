@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.fitting.objective import Objective
     from limit_surface_ros.fitting.search import Descent, Search
+    from limit_surface_ros.surface.base import LimitSurface
     from limit_surface_ros.surface.pairs import Pairs
-    from limit_surface_ros.surface.protocol import LimitSurface
 
 # A surface on whose scale the median of the fitted loads is further out or in has lost them.
 _SOUND = 3.0
