@@ -5,11 +5,14 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import select
 import signal
 import threading
 import time
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from multiprocessing.context import ForkContext, ForkProcess, SpawnContext, SpawnProcess
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from limit_surface_ros.errors import RangeError
@@ -17,12 +20,16 @@ from limit_surface_ros.errors import RangeError
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from concurrent.futures import Executor
-    from multiprocessing.connection import Connection
 
 # Processes for each core from which on more of them only cost memory, and time to begin.
 _MOST_PER_CORE = 4
-# Time that the pool's thread gets to drop what waits [s].
-_PATIENCE = 1.0
+# Time in which the pool's thread, on the busiest machine, drops what waits [s].
+_PATIENCE = 60.0
+# Of a pipe's content that is taken out at once [bytes], and time between looks at its user [ms].
+_PIECE = 2**16
+_LOOK = 50
+# One entry for each thread of this process, those that Python does not know of included.
+_THREADS = Path("/proc/self/task")
 
 
 def available_cores() -> int:
@@ -44,25 +51,68 @@ def worker_processes(workers: int) -> Iterator[Executor]:
     """
     if workers < 1:
         raise RangeError(f"workers must be at least 1, got {workers}")
-    # Forking is instant and safe while there are no threads; otherwise workers start afresh.
-    alone = threading.active_count() == 1 and "fork" in multiprocessing.get_all_start_methods()
-    context = multiprocessing.get_context("fork" if alone else "spawn")
     others = set(multiprocessing.active_children())
     size = min(workers, _MOST_PER_CORE * available_cores())
+    context = _Fork() if _may_fork() else _Spawn()
     pool = ProcessPoolExecutor(size, mp_context=context, initializer=_begin)
     try:
         yield pool
     except BaseException:
-        # After shutdown the pool no longer knows this pipe.
-        reader = _end_of_tasks(pool)
+        # A pool that was told to shut down no longer knows either.
+        drain = _Drain(pool)
         _forget_what_waits(pool)
         for process in set(multiprocessing.active_children()) - others:
             process.terminate()
-        if reader is not None:
-            reader.close()
+        drain.run_until_pool_has_ended()
         raise
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def _may_fork() -> bool:
+    """Tell whether forking is safe, as it is instant: no other thread may hold a lock meanwhile.
+
+    A process with a node has a dozen threads of its middleware, of which `threading` knows none.
+    """
+    try:
+        threads = sum(1 for _ in _THREADS.iterdir())
+    except OSError:
+        return False
+    return threads == 1 and "fork" in multiprocessing.get_all_start_methods()
+
+
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """Block SIGINT in this thread, and so in a process that is started here until `_begin`."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+class _ForkedWorker(ForkProcess):
+    """A worker that no interrupt meets before it leaves interrupts to its parent."""
+
+    def start(self) -> None:
+        with _interrupts_blocked():
+            super().start()
+
+
+class _SpawnedWorker(SpawnProcess):
+    """A worker that no interrupt meets before it leaves interrupts to its parent."""
+
+    def start(self) -> None:
+        with _interrupts_blocked():
+            super().start()
+
+
+class _Fork(ForkContext):
+    Process = _ForkedWorker
+
+
+class _Spawn(SpawnContext):
+    Process = _SpawnedWorker
 
 
 def _forget_what_waits(pool: ProcessPoolExecutor) -> None:
@@ -82,19 +132,44 @@ def _forget_what_waits(pool: ProcessPoolExecutor) -> None:
         time.sleep(0.001)
 
 
-def _end_of_tasks(pool: ProcessPoolExecutor) -> Connection | None:
-    """Return this process's copy of the end at which workers take their tasks, if there is one.
+class _Drain:
+    """Takes out of the pipe to a pool's workers what they will not take any more.
 
-    Once they are gone it must be closed: a thread that hands out a task larger than a pipe would
-    wait for a reader, and hold the program's end, for ever. Python itself does so from 3.11.5 on
-    (gh-94777).
+    A thread of the pool that hands out a task larger than the pipe would wait for a reader, and
+    hold the program's end, for ever: newer versions of Python see to that themselves (gh-94777).
+    Closing the pipe's end is not for us: that thread closes it, too, at any moment.
     """
-    return getattr(getattr(pool, "_call_queue", None), "_reader", None)
+
+    def __init__(self, pool: ProcessPoolExecutor) -> None:
+        """Note the pool's thread and the pipe while the pool still knows them."""
+        self._manager = getattr(pool, "_executor_manager_thread", None)
+        reader = getattr(getattr(pool, "_call_queue", None), "_reader", None)
+        self._end = None if self._manager is None or reader is None else os.dup(reader.fileno())
+
+    def run_until_pool_has_ended(self) -> None:
+        """Drain in a thread, which goes on if another interrupt ends this wait."""
+        if self._end is not None:
+            thread = threading.Thread(target=self._run, daemon=True)
+            thread.start()
+            thread.join()
+
+    def _run(self) -> None:
+        assert self._manager is not None
+        assert self._end is not None
+        try:
+            pipe = select.poll()
+            pipe.register(self._end, select.POLLIN)
+            while self._manager.is_alive():
+                if pipe.poll(_LOOK) and not os.read(self._end, _PIECE):
+                    self._manager.join()
+        finally:
+            os.close(self._end)
 
 
 def _begin() -> None:
     # A terminal interrupts the whole group: what becomes of the workers is the parent's to say.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
