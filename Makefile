@@ -25,7 +25,7 @@ test: ## Run the tests against the built packages (ARGS go to pytest: ARGS="-k n
 
 test_nightly: ## Run the tests that take long, which `make test` leaves out (ARGS go to pytest)
 	@scripts/with_ros --with test --with extras --isolated -- python3 scripts/run_pytest.py \
-	    -m nightly --timeout 1800 $(ARGS)
+	    -m nightly --timeout 3600 $(ARGS)
 
 lint: ## Check style, types and package descriptions
 	@scripts/with_ros --tools lint -- scripts/lint

@@ -12,8 +12,9 @@ import numpy as np
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import TwistStamped, WrenchStamped
 
+from process_helpers import WAIT
+
 STAMP = Time(sec=7, nanosec=8)
-WAIT = 20.0
 
 
 def wrench_message(wrench, frame="object", stamp=STAMP):

@@ -17,7 +17,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "docs")]
-WAIT = 20.0
+WAIT = 300.0
 
 
 def fill(message, values):

@@ -172,7 +172,6 @@ def test_every_code_block_of_a_page_runs(page, own_files, environment):
         env=environment,
         capture_output=True,
         text=True,
-        timeout=90,
     )
     assert run.returncode == 0, f"{run.stdout}\n{run.stderr}"
 
@@ -212,7 +211,6 @@ def test_the_first_hour_ends_with_a_model_a_picture_and_answers(tmp_path, enviro
         env=environment,
         capture_output=True,
         text=True,
-        timeout=90,
     )
     assert run.returncode == 0, f"{run.stdout}\n{run.stderr}"
     assert (tmp_path / "triangle.yaml").exists()

@@ -48,11 +48,10 @@ def test_the_python_client_prints_what_the_library_says(tmp_path, environment):
             env=environment,
             capture_output=True,
             text=True,
-            timeout=60,
         )
     finally:
         node.terminate()
-        assert node.wait(timeout=20) == 0
+        assert node.wait() == 0
     assert run.returncode == 0, run.stderr
     numbers = [
         [float(n) for n in re.findall(r"-?\d+\.\d+", line)] for line in run.stdout.split("\n")
@@ -78,7 +77,6 @@ def test_the_python_client_says_so_when_no_node_runs(environment):
         env=environment,
         capture_output=True,
         text=True,
-        timeout=60,
     )
     assert run.returncode == 1
     assert "is the node running?" in run.stderr
@@ -98,6 +96,6 @@ def test_the_cpp_client_compiles(tmp_path):
         ["-S", str(EXAMPLES / "cpp_client"), "-B", str(tmp_path)],
         ["--build", str(tmp_path)],
     ):
-        run = subprocess.run(["cmake", *arguments], capture_output=True, text=True, timeout=300)
+        run = subprocess.run(["cmake", *arguments], capture_output=True, text=True)
         assert run.returncode == 0, run.stdout + run.stderr
     assert (tmp_path / "cpp_client").exists()

@@ -14,8 +14,7 @@ import pytest
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
-
-WAIT = 20.0
+from process_helpers import WAIT
 
 
 def _own_domain() -> tuple[int, socket.socket]:
@@ -81,9 +80,9 @@ class Spinner:
 
         def call(request, timeout=WAIT):
             # Under load a server may drop an answer to a client that it has not discovered yet.
-            for _ in range(3):
+            for _ in range(10):
                 future = client.call_async(request)
-                if self.done(future, timeout / 3):
+                if self.done(future, timeout / 10):
                     return future.result()
                 client.remove_pending_request(future)
             raise AssertionError(f"no answer from {name}")

@@ -32,11 +32,9 @@ def test_stamps_in_wall_time_follow_each_other_at_the_rate_and_never_run_ahead(
     bench.onset(0)
     count = int(rate)
     ros.wait(lambda: len(bench.wrenches) >= count)
-    now = bench.now
     stamps = np.array([time_of(message) for message in bench.wrenches[:count]])
-    # On time: a message with a later stamp has not been published yet, one with an earlier has.
-    assert stamps[-1] <= now
-    assert now - stamps[-1] < SECOND
+    # A message that is stamped later has not been published yet.
+    assert stamps[-1] <= bench.now
     np.testing.assert_array_equal(np.diff(stamps), round(SECOND / rate))
     start = time_of(bench.forecasts[0])
     times = (stamps - start) * 1e-9

@@ -34,6 +34,7 @@ from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.scaling import Scaling
 from node_helpers import Program, planar_twist, wrench_message
+from process_helpers import WAIT
 
 CODES = {
     ErrorCode.NONE,
@@ -204,7 +205,7 @@ def test_a_client_that_dies_in_the_middle_of_a_call_harms_nobody(ros, client_nod
         for _ in range(5):
             dying = rclpy.create_node("dying", context=ros.context)
             client = dying.create_client(WrenchesToTwists, "/limit_surface/wrenches_to_twists")
-            assert client.wait_for_service(timeout_sec=20.0)
+            assert client.wait_for_service(timeout_sec=WAIT)
             client.call_async(WrenchesToTwists.Request(wrenches=flat))
             dying.destroy_node()
         assert call(WrenchesToTwists.Request(wrenches=flat)).error_code == ErrorCode.NONE
@@ -230,7 +231,7 @@ def test_requests_of_a_million_rows_leave_no_memory_behind(ros, client_node, mod
         flat = convert.flat_of(np.ones((1_000_000, 3)))
         sizes = []
         for _ in range(6):
-            answer = call(WrenchesToTwists.Request(wrenches=flat), timeout=60.0)
+            answer = call(WrenchesToTwists.Request(wrenches=flat))
             assert answer.error_code == ErrorCode.NONE
             sizes.append(resident(program.process.pid))
         code, output = program.end()
@@ -254,7 +255,7 @@ def test_a_signal_during_a_call_ends_the_node_cleanly_after_its_answer(
     with Program("limit_surface_node", "--ros-args", *options) as program:
         name = "/limit_surface/wrenches_to_twists"
         client = client_node.create_client(WrenchesToTwists, name)
-        assert client.wait_for_service(timeout_sec=20.0)
+        assert client.wait_for_service(timeout_sec=WAIT)
         idle = processor_ticks(program.process.pid)
         flat = convert.flat_of(wrenches)
         answered = client.call_async(WrenchesToTwists.Request(wrenches=flat))
@@ -262,7 +263,7 @@ def test_a_signal_during_a_call_ends_the_node_cleanly_after_its_answer(
         assert not answered.done()
         code, output = program.end(number)
     assert code == 0, output
-    assert ros.done(answered, 20.0)
+    assert ros.done(answered, WAIT)
     assert len(answered.result().twists) == wrenches.size
     assert "Traceback" not in output
     assert "terminate" not in output

@@ -19,6 +19,7 @@ from rclpy.parameter import Parameter
 
 from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
 from node_helpers import STAMP, planar_twist, planar_wrench, twist_message, wrench_message
+from process_helpers import WAIT
 
 
 @pytest.fixture
@@ -125,9 +126,9 @@ def test_messages_that_wait_are_taken_in_one_turn_and_in_order(ros, client_node,
     ros.matched(node._twists)
     for second in range(8):
         loads.publish(wrench_message([9.0, 0.0, 0.0], stamp=Time(sec=second)))
-    assert loads.wait_for_all_acked(Duration(seconds=20))
+    assert loads.wait_for_all_acked(Duration(seconds=WAIT))
     while not node.health.accepted["wrench"]:
-        executor.spin_once(timeout_sec=20.0)
+        executor.spin_once(timeout_sec=WAIT)
     assert node.health.accepted["wrench"] == 8
     ros.wait(lambda: len(twists) == 8)
     assert [twist.header.stamp.sec for twist in twists] == list(range(8))

@@ -38,7 +38,6 @@ def with_ros(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
             env={"PATH": str(folder), "PYTHON": python, "HOME": str(tmp_path), **variables},
             capture_output=True,
             text=True,
-            timeout=60,
             check=False,
         )
 

@@ -53,7 +53,6 @@ def test_a_phone_shows_every_figure_within_its_width(tmp_path):
         [CHROMIUM, *FLAGS, profile, "--virtual-time-budget=10000", "--dump-dom", frame.as_uri()],
         capture_output=True,
         text=True,
-        timeout=120,
         check=True,
     ).stdout
     seen = json.loads(html.unescape(re.search(r"<pre>(.*?)</pre>", dump, re.DOTALL)[1]))

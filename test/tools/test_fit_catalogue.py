@@ -178,12 +178,12 @@ def test_an_interrupted_run_leaves_whole_models_and_goes_on(tmp_path, capsys):
     process = started(MODULE, *arguments, stderr=subprocess.PIPE, stdout=subprocess.PIPE)
     until(lambda: output.is_dir() and list(output.glob("*.yaml")), "the first model")
     os.killpg(process.pid, signal.SIGINT)
-    errors = process.communicate(timeout=20)[1]
+    errors = process.communicate()[1]
     assert process.returncode == 130
     assert errors.splitlines() == [
         "fit_catalogue: interrupted; finished models are kept, the same command goes on from there"
     ]
-    until(lambda: group_is_gone(process.pid), "every process of the run ends", 5)
+    until(lambda: group_is_gone(process.pid), "every process of the run ends")
     done = times(output)
     assert 0 < len(done) < 30
     for name in done:
@@ -203,7 +203,7 @@ def test_a_killed_run_leaves_no_process_and_goes_on(tmp_path):
     until(lambda: output.is_dir() and list(output.glob("*.yaml")), "the first model")
     process.kill()
     process.wait()
-    until(lambda: group_is_gone(process.pid), "the workers end with their parent", 20)
+    until(lambda: group_is_gone(process.pid), "the workers end with their parent")
     done = times(output)
     assert len(list(output.glob("*.yaml"))) < 30
     assert run(tmp_path / "pushes", output) == 0

@@ -64,7 +64,7 @@ def test_nothing_is_lost_when_a_worker_is_killed(dask, address, tmp_path):
     )
     until(lambda: output.is_dir() and len(list(output.glob("*.yaml"))) >= 6, "some models")
     workers[0].send_signal(signal.SIGKILL)
-    printed, errors = program.communicate(timeout=90)
+    printed, errors = program.communicate()
     assert program.returncode == 0, errors
     assert "24 fitted, 0 kept, 0 failed" in printed
     assert errors == ""
@@ -81,7 +81,7 @@ def refusal(folder, address):
     write_objects(folder / "pushes", 1)
     arguments = [folder / "pushes", "-o", folder / "models", "--dask", address]
     process = started_python("-c", program, *arguments, stderr=subprocess.PIPE)
-    errors = process.communicate(timeout=60)[1]
+    errors = process.communicate()[1]
     return process.returncode, errors
 
 

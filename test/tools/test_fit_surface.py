@@ -317,11 +317,11 @@ def test_an_interrupted_fit_says_so_and_leaves_neither_file_nor_process(pushes, 
     # Well past the imports, in the fit: told by the processor time of the group's processes.
     until(lambda: processor_ticks(process.pid) > 3 * os.sysconf("SC_CLK_TCK"), "the fit is going")
     os.killpg(process.pid, signal.SIGINT)
-    errors = process.communicate(timeout=20)[1]
+    errors = process.communicate()[1]
     assert process.returncode == 130
     assert len(errors.splitlines()) == 1
     assert "interrupted" in errors
-    until(lambda: group_is_gone(process.pid), "every process of the run ends", 5)
+    until(lambda: group_is_gone(process.pid), "every process of the run ends")
     assert [path.name for path in tmp_path.iterdir()] == ["pushes.csv"]
 
 
