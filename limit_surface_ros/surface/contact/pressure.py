@@ -76,7 +76,10 @@ def rim(power: float = 4.0) -> Pressure:
 
 
 def centre_heavy(power: float = 2.0) -> Pressure:
-    """Return a pressure that falls from the centroid to 0 at the farthest cell, as 1 - d^power.
+    """Return a pressure that falls as 1 - d^power from the centroid to 0 at the rim.
+
+    d is the distance from the centroid in parts of that of the shape's farthest point: a disc's
+    whole rim, a rectangle's corners.
 
     Raises:
         RangeError: The power is not above 0.
@@ -86,5 +89,7 @@ def centre_heavy(power: float = 2.0) -> Pressure:
 
 
 def _relative_distance(cells: Cells) -> Floats:
+    """Return the cells' distances from the centroid in parts of the shape's reach, at most 1."""
     distances = np.linalg.norm(cells.points - cells.centroid, axis=1)
-    return np.asarray(distances / max(float(distances.max()), np.finfo(np.float64).tiny))
+    # A single cell is at its own centroid and has no reach.
+    return np.asarray(np.minimum(distances / max(cells.reach, np.finfo(np.float64).tiny), 1.0))

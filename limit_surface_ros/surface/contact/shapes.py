@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Shapes of contact as cells: points with areas, by which integrals over the shape become sums.
 
-Every function returns `Cells` of about `count` cells, each with its centroid and its area (for a
-line its length), so that areas and centres are exact whatever the count.
+Every function returns `Cells` of about `count` cells, each a point with an area (for a line a
+length). Discs, rings, ellipses and rectangles place them by the Gauss rule of two points in each
+direction, whose sums are exact for polynomials of third degree on every block of four cells; so
+areas and centres are exact whatever the count, and smooth pressures are to its square. A polygon's
+and a line's cells are at their centroids.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,9 +25,18 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.checks import Floats
 
-# Loads of 1000 cells are within 4e-4 of the friction limit at half of all motions and 3e-3 at all;
-# those of 10 000 within 4e-5 and 2e-4: the error falls as 1 / count (bench_exactness.py).
+# Loads of 1000 cells of a disc are within 3e-5 of the friction limit at half of all motions and
+# 2e-3 at all, where the centre of rotation is next to a cell; those of 10 000 within 1e-7 and 2e-4
+# (bench_exactness.py). The moment of a pure turn is within 3e-5 for every pressure here.
 DEFAULT_COUNT = 1000
+# Lengths of bodies [m]: beyond them squares and areas leave the range of numbers.
+SHORTEST, LONGEST = 1e-9, 1e9
+# Offset of the two points of the Gauss rule from the middle of an interval of length 1.
+_GAUSS = 0.5 / np.sqrt(3.0)
+# Boxes over a polygon's bounding box, in parts of its cells: more for slivers, but not any number.
+_MOST_BOXES = 100
+# Coordinates of a centroid that are smaller, in parts of the reach, are rounding of zero.
+_ZERO = 1e-12
 
 
 @dataclass(frozen=True)
@@ -35,15 +46,26 @@ class Cells:
     Attributes:
         points: Centroids of the cells [m], shape (n, 2).
         sizes: Areas [m^2] or lengths [m] of the cells, shape (n,).
+        reach: Distance [m] from the centroid to the farthest point of the shape; that of the
+            farthest cell if not given.
     """
 
     points: Floats
     sizes: Floats
+    reach: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Fill in the reach."""
+        if not self.reach > 0.0:
+            arms = np.linalg.norm(self.points - self.centroid, axis=1)
+            object.__setattr__(self, "reach", float(arms.max(initial=0.0)))
 
     @property
     def centroid(self) -> Floats:
-        """Centroid of the shape [m], shape (2,)."""
-        return np.asarray(self.sizes @ self.points / self.sizes.sum())
+        """Centroid of the shape [m], shape (2,); a coordinate that is rounding of zero is 0."""
+        centroid = np.asarray(self.sizes @ self.points / self.sizes.sum())
+        size = max(self.reach, float(np.abs(self.points).max(initial=0.0)))
+        return np.where(np.abs(centroid) < _ZERO * size, 0.0, centroid)
 
     def placed(self, centre: ArrayLike = (0.0, 0.0), angle: float = 0.0) -> Cells:
         """Return the shape turned by `angle` [rad] about its origin, and then moved to `centre`.
@@ -56,19 +78,19 @@ class Cells:
             raise ShapeError(f"centre must have shape (2,), got {offset.shape}")
         cos, sin = np.cos(angle), np.sin(angle)
         turn = np.array([[cos, sin], [-sin, cos]])
-        return Cells(self.points @ turn + offset, self.sizes)
+        return Cells(self.points @ turn + offset, self.sizes, self.reach)
 
 
 def ellipse(semi_axes: ArrayLike, count: int = DEFAULT_COUNT) -> Cells:
     """Return an ellipse about the origin with semi-axes (a, b) [m] along x and y."""
     axes = _positive_pair("semi_axes", semi_axes)
     disc = ring(0.0, 1.0, count)
-    return Cells(disc.points * axes, disc.sizes * axes.prod())
+    return Cells(disc.points * axes, disc.sizes * axes.prod(), float(axes.max()))
 
 
 def disc(radius: float, count: int = DEFAULT_COUNT) -> Cells:
     """Return a disc of that radius [m] about the origin."""
-    return ring(0.0, as_positive("radius", radius), count)
+    return ring(0.0, _length("radius", radius), count)
 
 
 def ring(inner_radius: float, outer_radius: float, count: int = DEFAULT_COUNT) -> Cells:
@@ -79,27 +101,30 @@ def ring(inner_radius: float, outer_radius: float, count: int = DEFAULT_COUNT) -
     Raises:
         RangeError: The radii are not 0 <= inner <= outer, outer above 0.
     """
-    outer = as_positive("outer_radius", outer_radius)
+    outer = _length("outer_radius", outer_radius)
     if not 0.0 <= inner_radius <= outer:
         raise RangeError(f"inner_radius must be from 0 to {outer}, got {inner_radius}")
     _check_count(count)
     if inner_radius == outer:
         angle = 2.0 * np.pi * np.arange(count) / count
         points = outer * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        return Cells(points, np.full(count, 2.0 * np.pi * outer / count))
-    # Annuli of equal width, each cut into cells about as long as they are wide.
-    width = np.sqrt(np.pi * (outer**2 - inner_radius**2) / count)
-    edges = np.linspace(inner_radius, outer, max(1, round((outer - inner_radius) / width)) + 1)
-    centres: list[Floats] = []
-    areas: list[Floats] = []
-    for index, (low, high) in enumerate(pairwise(edges)):
-        cells = max(3, round(np.pi * (low + high) / (high - low)))
-        half = np.pi / cells
-        angle = 2.0 * half * np.arange(cells) + half * (index % 2)
-        radius = 2.0 / 3.0 * (high**3 - low**3) / (high**2 - low**2) * np.sin(half) / half
-        centres.append(radius * np.stack([np.cos(angle), np.sin(angle)], axis=1))
-        areas.append(np.full(cells, half * (high**2 - low**2)))
-    return Cells(np.concatenate(centres), np.concatenate(areas))
+        return Cells(points, np.full(count, 2.0 * np.pi * outer / count), outer)
+    # Annuli of equal width with two circles of points in each, as far apart along the circles as
+    # the circles are from each other.
+    thickness = outer - inner_radius
+    area = np.pi * (outer + inner_radius) * thickness / count
+    annuli = max(1, round(0.5 * thickness / np.sqrt(area)))
+    width = thickness / annuli
+    middles = inner_radius + width * (np.arange(annuli) + 0.5)
+    points_of_circles: list[Floats] = []
+    sizes: list[Floats] = []
+    for index, radius in enumerate((middles[:, None] + [-_GAUSS * width, _GAUSS * width]).ravel()):
+        # An even number: every circle, and so the disc, is symmetric about both axes.
+        half = max(2, round(0.5 * np.pi * radius * width / area))
+        angle = np.pi * (np.arange(2 * half) + 0.5 * (index % 2)) / half
+        points_of_circles.append(radius * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+        sizes.append(np.full(2 * half, 0.5 * np.pi * radius * width / half))
+    return Cells(np.concatenate(points_of_circles), np.concatenate(sizes), outer)
 
 
 def rectangle(size: ArrayLike, count: int = DEFAULT_COUNT) -> Cells:
@@ -107,10 +132,17 @@ def rectangle(size: ArrayLike, count: int = DEFAULT_COUNT) -> Cells:
     extent = _positive_pair("size", size)
     _check_count(count)
     cell = np.sqrt(extent.prod() / count)
-    numbers = np.maximum(1, np.round(extent / cell)).astype(int)
-    x, y = (w * ((np.arange(n) + 0.5) / n - 0.5) for w, n in zip(extent, numbers, strict=True))
+    blocks = np.clip(np.round(0.5 * extent / cell), 1, max(1, count // 2)).astype(int)
+    x, y = (w * _gauss_points(n) for w, n in zip(extent, blocks, strict=True))
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    return Cells(points, np.full(len(points), extent.prod() / numbers.prod()))
+    sizes = np.full(len(points), extent.prod() / len(points))
+    return Cells(points, sizes, 0.5 * float(np.hypot(*extent)))
+
+
+def _gauss_points(blocks: int) -> Floats:
+    """Return two points in each of so many equal parts of [-1/2, 1/2], shape (2 blocks,)."""
+    middles = (np.arange(blocks) + 0.5) / blocks - 0.5
+    return np.asarray((middles[:, None] + np.array([-_GAUSS, _GAUSS]) / blocks).ravel())
 
 
 def line(start: ArrayLike, end: ArrayLike, count: int = 100) -> Cells:
@@ -126,8 +158,10 @@ def line(start: ArrayLike, end: ArrayLike, count: int = 100) -> Cells:
     length = float(np.hypot(*(ends[1] - ends[0])))
     if length == 0.0:
         raise GeometryError(f"a line of contact needs two points, got {ends[0].tolist()} twice")
+    _length("the length of a line", length)
     share = (np.arange(count)[:, np.newaxis] + 0.5) / count
-    return Cells(ends[0] + share * (ends[1] - ends[0]), np.full(count, length / count))
+    points = ends[0] + share * (ends[1] - ends[0])
+    return Cells(points, np.full(count, length / count), 0.5 * length)
 
 
 def polygon(
@@ -155,7 +189,8 @@ def polygon(
     if not shape.area > 0.0:
         raise GeometryError("the polygon has no area")
     left, bottom, right, top = shape.bounds
-    side = np.sqrt(shape.area / count)
+    _length("the longer side of a polygon", max(right - left, top - bottom))
+    side = np.sqrt(max(shape.area, (right - left) * (top - bottom) / _MOST_BOXES) / count)
     across = np.linspace(left, right, max(1, round((right - left) / side)) + 1)
     along = np.linspace(bottom, top, max(1, round((top - bottom) / side)) + 1)
     x, y = np.meshgrid(across[:-1], along[:-1])
@@ -163,7 +198,10 @@ def polygon(
     pieces = shapely.intersection(boxes, shape)
     areas = shapely.area(pieces)
     kept = areas > 1e-12 * shape.area
-    return Cells(shapely.get_coordinates(shapely.centroid(pieces[kept])), areas[kept])
+    centroid = shapely.get_coordinates(shape.centroid)
+    corners = shapely.get_coordinates(shape.exterior)
+    reach = float(np.linalg.norm(corners - centroid, axis=1).max())
+    return Cells(shapely.get_coordinates(shapely.centroid(pieces[kept])), areas[kept], reach)
 
 
 def bitmap(pressures: ArrayLike, cell: float) -> tuple[Cells, Floats]:
@@ -206,7 +244,21 @@ def _positive_pair(name: str, values: ArrayLike) -> Floats:
         raise ShapeError(f"{name} must be two numbers, got shape {pair.shape}")
     if not (pair > 0.0).all():
         raise RangeError(f"{name} must be above 0, got {pair.tolist()}")
+    for length in pair:
+        _length(name, float(length))
     return pair
+
+
+def _length(name: str, value: float) -> float:
+    """Return a length that a body can have.
+
+    Raises:
+        RangeError: It is not above 0, or too small or too large for areas of it.
+    """
+    length = as_positive(name, value)
+    if not SHORTEST <= length <= LONGEST:
+        raise RangeError(f"{name} must be from {SHORTEST:g} to {LONGEST:g} m, got {length:g}")
+    return length
 
 
 def _check_count(count: int) -> None:
