@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One push in plain floats, through the public maps of a surface for one vector."""
+
+from __future__ import annotations
+
+from functools import cache
+from math import atan2, cos, hypot, sin
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from limit_surface_ros.bracket import root_bracket
+from limit_surface_ros.checks import as_floats
+from limit_surface_ros.errors import RangeError, ShapeError, ZeroVectorError
+from limit_surface_ros.motion.outcomes import ContactMode, Push
+from limit_surface_ros.surface.kinds.dissipation_surface import DissipationSurface
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.protocol import LimitSurface
+
+# Width of a bracket of angles [rad], or part of the range of turning rates, that is as good as
+# one of them.
+_WIDTH = 4e-16
+# Error of an angle [rad], or of a moment in parts of the moment unit, that counts as none.
+_EXACT = 4e-15
+# Product of two such errors between which what is straight in them is as good.
+_STRAIGHT = 1e-28
+# A body that turns freely about its contact needs no turning rate, however large.
+_DOUBLINGS = 60
+_INFINITY = float("inf")
+
+
+class Response(NamedTuple):
+    """What a force causes: the twist, and the velocity at the contact."""
+
+    force: _Pair
+    twist: Floats
+    velocity: _Pair
+
+
+_Pair: TypeAlias = "tuple[float, float]"
+# A sticking push, or the edge of the friction cone along which the pusher slides, and how.
+_Outcome: TypeAlias = "Push | tuple[Response, ContactMode]"
+
+
+class ContactScalar:
+    """A contact point with its friction cone."""
+
+    def __init__(
+        self, surface: LimitSurface, point: ArrayLike, normal: ArrayLike, friction: float
+    ) -> None:
+        """Check the numbers; see `push`."""
+        self._surface = surface
+        self._x, self._y = pair("point", point)
+        nx, ny = pair("normal", normal)
+        if not (nx or ny):
+            raise ZeroVectorError("normal must not be zero: it has no direction")
+        if not friction >= 0.0:
+            raise RangeError(f"friction must be 0 or above, up to infinity, got {friction}")
+        size = max(abs(nx), abs(ny))
+        nx, ny = nx / size, ny / size
+        length = hypot(nx, ny)
+        self.normal = nx / length, ny / length
+        # Of the edges' unit forces, along the normal and to its left.
+        self._along = 1.0 / hypot(1.0, friction)
+        self._across = friction * self._along if friction < _INFINITY else 1.0
+
+    def edge(self, side: float) -> Response:
+        """Return what the force along the left (1) or right (-1) edge of the cone causes."""
+        return self._respond(self._along, side * self._across)
+
+    def stick_by_force(self, velocity: _Pair) -> _Outcome:
+        """Find the force within the cone for which the body follows the pusher.
+
+        Where the load is at a corner of the surface its twists fill a cone: the answer is the sum
+        of its edges that has the pusher's velocity.
+        """
+        wanted = atan2(turn(self.normal, velocity), product(self.normal, velocity))
+        limit = atan2(self._across, self._along)
+        responses: dict[float, Response] = {}
+
+        def error(angle: float) -> float:
+            if angle not in responses:
+                if abs(angle) < limit:
+                    responses[angle] = self._respond(cos(angle), sin(angle))
+                else:
+                    responses[angle] = self.edge(1.0 if angle > 0.0 else -1.0)
+            force, _, caused = responses[angle]
+            # Friction takes power: velocity and force are less than 90 deg apart.
+            return angle + atan2(turn(force, caused), product(force, caused)) - wanted
+
+        # The side to which the pusher moves is the likelier to slide.
+        for side in (1.0, -1.0) if wanted > 0.0 else (-1.0, 1.0):
+            if side * error(side * limit) < -_EXACT:
+                mode = ContactMode.SLIDE_LEFT if side > 0.0 else ContactMode.SLIDE_RIGHT
+                return responses[side * limit], mode
+        low, high = root_bracket(error, -limit, limit, _WIDTH, _EXACT, _STRAIGHT)
+        below, above = max(0.0, -error(low)), max(0.0, error(high))
+        twist, force = responses[low].twist, responses[low].force
+        if low < high and below + above > 0.0:
+            # Unit velocities weigh as the sines of the angles that they are off.
+            first = sin(above) / hypot(*responses[low].velocity)
+            second = sin(below) / hypot(*responses[high].velocity)
+            twist = first * twist + second * responses[high].twist
+            part, (ax, ay), (bx, by) = second / (first + second), force, responses[high].force
+            force = ax + part * (bx - ax), ay + part * (by - ay)
+        wrench = self.wrench(force, twist)
+        caused = self._velocity(twist)
+        return Push(
+            product(velocity, velocity) / product(velocity, caused) * twist,
+            ContactMode.STICK,
+            wrench,
+        )
+
+    def stick_by_turning(self, surface: DissipationSurface, velocity: _Pair) -> _Outcome:
+        """Find the motion of least dissipation in which the body follows the pusher.
+
+        The moment about the contact of the load that a turning rate needs rises with the rate,
+        and is zero in a push. Where support points stand still it jumps: the answer is then the
+        sum of the loads on both sides that has no moment. These loads come in closed form.
+        """
+        vx, vy = velocity
+
+        def motion(rate: float) -> tuple[float, float, float]:
+            return vx + rate * self._y, vy - rate * self._x, rate
+
+        @cache
+        def load(rate: float) -> Floats:
+            return surface.wrench_of_twist(motion(rate))
+
+        def moment(rate: float) -> float:
+            fx, fy, torque = load(rate).tolist()
+            return float(torque - self._x * fy + self._y * fx)
+
+        reach = 1.0 / surface.scaling.characteristic_length
+        for _ in range(_DOUBLINGS):
+            if moment(-reach) <= 0.0 <= moment(reach):
+                break
+            reach *= 2.0
+        unit = float(surface.scaling.wrench_unit[2])
+        low, high = root_bracket(
+            moment, -reach, reach, _WIDTH * reach, _EXACT * unit, _STRAIGHT * unit * unit
+        )
+        below, above = moment(low), moment(high)
+        share = below / (below - above) if below < above else 0.5
+        wrench = (1.0 - share) * load(low) + share * load(high)
+        fx, fy, _ = wrench.tolist()
+        across = turn(self.normal, (fx, fy))
+        if abs(across) * self._along > self._across * product(self.normal, (fx, fy)):
+            if across > 0.0:
+                return self.edge(1.0), ContactMode.SLIDE_LEFT
+            return self.edge(-1.0), ContactMode.SLIDE_RIGHT
+        rate = (1.0 - share) * low + share * high
+        return Push(np.array(motion(rate)), ContactMode.STICK, wrench)
+
+    def wrench(self, force: _Pair, twist: Floats) -> Floats:
+        """Return the wrench on the surface (3,) along a force that causes a twist."""
+        load = self._load(force)
+        factor = self._surface.load_factor(load)
+        # Beside a single support point a body turns freely under any force, however small: the
+        # twist alone says which one it needs.
+        return np.array(load) / factor if factor < np.inf else self._surface.wrench_of_twist(twist)
+
+    def _respond(self, along: float, across: float) -> Response:
+        """Return what a force along the normal and to its left causes."""
+        nx, ny = self.normal
+        force = along * nx - across * ny, along * ny + across * nx
+        twist = self._surface.twist_of_wrench(self._load(force))
+        return Response(force, twist, self._velocity(twist))
+
+    def _velocity(self, twist: Floats) -> _Pair:
+        vx, vy, omega = twist.tolist()
+        return vx - omega * self._y, vy + omega * self._x
+
+    def _load(self, force: _Pair) -> tuple[float, float, float]:
+        """Return the wrench of a force through the contact."""
+        fx, fy = force
+        return fx, fy, self._x * fy - self._y * fx
+
+
+def turn(a: _Pair, b: _Pair) -> float:
+    """Return the cross product, positive if b is to the left of a."""
+    return a[0] * b[1] - a[1] * b[0]
+
+
+def product(a: _Pair, b: _Pair) -> float:
+    """Return the scalar product."""
+    return a[0] * b[0] + a[1] * b[1]
+
+
+def pair(name: str, values: Any) -> _Pair:
+    """Return two finite numbers.
+
+    Raises:
+        ShapeError: They are no pair of numbers.
+        NotFiniteError: One is NaN or infinite.
+    """
+    if type(values) in (list, tuple) and len(values) == 2:
+        x, y = values
+        # The quick way for plain numbers; NaN and infinity fail the comparison.
+        if type(x) is type(y) is float and abs(x) + abs(y) < float("inf"):
+            return x, y
+    pair = as_floats(name, values)
+    if pair.shape != (2,):
+        raise ShapeError(f"{name} must have shape (2,), got {pair.shape}")
+    x, y = pair.tolist()
+    return x, y
