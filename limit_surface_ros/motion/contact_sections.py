@@ -26,7 +26,7 @@ from limit_surface_ros.surface.linalg import root_of
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.surface.base import LimitSurface
 
 
 # Angle [rad] over which differences are taken where no derivative is known.

@@ -24,7 +24,7 @@ from limit_surface_ros.surface.kinds.dissipation_surface import DissipationSurfa
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Bools, Floats, Places
-    from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.surface.base import LimitSurface
 
 
 # Angle [rad] beyond which two ways to compute one wrench agree on the side of a corner.

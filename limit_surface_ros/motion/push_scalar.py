@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.surface.base import LimitSurface
 
 # Width of a bracket of angles [rad], or part of the range of turning rates, that is as good as
 # one of them.
