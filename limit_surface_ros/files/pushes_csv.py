@@ -2,16 +2,15 @@
 """Recorded pushes in CSV: one row per push, the wrench that acted and the twist that it caused.
 
 An optional first line `# {...}` holds a JSON object about the recording (`rho_m`,
-`normal_force_N`, `support_points_m_body_frame`, `support_loads_N` and whatever else); blank lines
-and further lines that begin with `#` are skipped. Then a line of column names, in any order:
+`normal_force_N`, `support_points_m_body_frame`, `support_loads_N` and whatever else); see
+`csv_table` for what else may stand above the rows. A line names the columns, in any order:
 `fx_N, fy_N, tau_Nm` the wrench on the body, `vx, vy, omega` its twist, of which only the direction
-matters; other columns are ignored.
+matters; other columns are ignored. Names may state other units, as `tau [N mm]`, and so may a row
+of units below them.
 """
 
 from __future__ import annotations
 
-import json
-import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,18 +19,37 @@ import numpy as np
 
 from limit_surface_ros.checks import LARGEST, SMALLEST
 from limit_surface_ros.errors import DataError, FileError
-from limit_surface_ros.files.csv_row import cells_of
+from limit_surface_ros.files import units
+from limit_surface_ros.files.csv_table import read_table
+from limit_surface_ros.files.regular_file import json_object
 from limit_surface_ros.surface.pairs import Pairs
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.files.csv_table import CsvOptions, CsvTable
 
 WRENCH_COLUMNS = ("fx_N", "fy_N", "tau_Nm")
 TWIST_COLUMNS = ("vx", "vy", "omega")
 COLUMNS = WRENCH_COLUMNS + TWIST_COLUMNS
-_BY_COMMAS = "; columns are separated by commas"
+# What else loggers call the columns, in small letters and without units.
+_ALIASES = {
+    "fx_N": ("fx", "force_x", "force.x"),
+    "fy_N": ("fy", "force_y", "force.y"),
+    "tau_Nm": ("tau", "tau_z", "tz", "mz", "torque_z", "torque.z"),
+    "vx": ("vx", "v_x", "linear.x"),
+    "vy": ("vy", "v_y", "linear.y"),
+    "omega": ("omega", "omega_z", "wz", "angular.z"),
+}
+_UNITS = {
+    "fx_N": units.FORCE,
+    "fy_N": units.FORCE,
+    "tau_Nm": units.TORQUE,
+    "vx": units.SPEED,
+    "vy": units.SPEED,
+    "omega": units.TURNING,
+}
 
 
 @dataclass(frozen=True)
@@ -42,11 +60,13 @@ class Pushes:
         path: Where they were read.
         pairs: One wrench and twist per row.
         about: The JSON object of the first line, empty if there is none.
+        notes: What was guessed, skipped, converted or left out, in one line each.
     """
 
     path: Path
     pairs: Pairs
     about: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def rows(self, numbers: Sequence[int]) -> Pairs:
         """Return the pairs of the rows with these numbers, from 0, in that order.
@@ -111,86 +131,111 @@ class Pushes:
         return places, forces
 
 
-def read_pushes(path: str | Path) -> Pushes:
+def read_pushes(path: str | Path, options: CsvOptions | None = None) -> Pushes:
     """Read recorded pushes.
+
+    Args:
+        path: The file.
+        options: How cells are written, and whether bad rows are left out.
 
     Raises:
         FileError: The file is absent or unreadable, a column is missing, or a row is not what it
             must be; the message names file and line.
     """
     path = Path(path)
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except OSError as error:
-        raise FileError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError as error:
-        raise FileError(f"{path}: is not UTF-8 text: {error}") from None
-    numbered = [(number, line) for number, line in enumerate(lines, start=1) if line.strip()]
-    if not numbered:
+    table = read_table(path, options, _are_names)
+    if not table.rows and table.names is None:
         raise FileError(f"{path}: is empty; a line of column names and rows are accepted")
-    about = _about(path, numbered[0])
-    rows = [(number, line) for number, line in numbered if not line.lstrip().startswith("#")]
-    if not rows:
-        raise FileError(f"{path}: has no line of column names; needed are {', '.join(COLUMNS)}")
-    columns = _columns(path, *rows[0])
-    if len(rows) == 1:
-        raise FileError(f"{path}: line {rows[0][0]}: no rows follow the column names")
-    table = np.array([_row(path, number, line, columns) for number, line in rows[1:]])
-    return Pushes(path, Pairs(table[:, :3], table[:, 3:]), about)
+    columns = [_column(table, name) for name in COLUMNS]
+    if not table.rows:
+        raise FileError(f"{path}: line {table.names_line}: no rows follow the column names")
+    factors = [_factor(table, name, column) for name, column in zip(COLUMNS, columns, strict=True)]
+    rows = [_row(table, row, columns) for row in range(len(table.rows))]
+    kept = [row for row, values in enumerate(rows) if values is not None]
+    table.keep(kept, "they are no push")
+    values = np.array([rows[row] for row in kept]) * factors
+    return Pushes(path, Pairs(values[:, :3], values[:, 3:]), _about(table), tuple(table.notes))
 
 
-def _about(path: Path, first: tuple[int, str]) -> dict[str, Any]:
+def _about(table: CsvTable) -> dict[str, Any]:
     """Return the JSON object in the first line, if that is a comment that holds one."""
-    number, line = first
-    text = line.strip().removeprefix("#").strip()
-    if not line.lstrip().startswith("#") or not text.startswith("{"):
+    text = table.first_line.strip()
+    if not text.startswith("#") or not text.removeprefix("#").strip().startswith("{"):
         return {}
-    try:
-        about = json.loads(text)
-    except ValueError as error:
-        raise FileError(f"{path}: line {number}: is not a JSON object: {error}") from None
-    return dict(about)
+    place = f"{table.path}: line {table.first_number}"
+    return json_object(text.removeprefix("#").strip(), place)
 
 
-def _columns(path: Path, number: int, line: str) -> list[str]:
-    names = cells_of(path, number, line)
-    for name in COLUMNS:
-        if names.count(name) != 1:
-            found = "is missing" if name not in names else "is given twice"
-            hint = "" if len(names) > 1 else _BY_COMMAS
-            raise FileError(
-                f"{path}: line {number}: column {name} {found}; needed are "
-                f"{', '.join(COLUMNS)}, got {', '.join(names)}{hint}"
-            )
-    return names
+def _are_names(cells: Sequence[str]) -> bool:
+    return all(_places(cells, name) for name in COLUMNS)
 
 
-def _row(path: Path, number: int, line: str, columns: list[str]) -> list[float]:
-    """Return the six numbers of a row in the order of COLUMNS."""
-    place = f"{path}: line {number}"
-    cells = cells_of(path, number, line)
-    if len(cells) != len(columns):
-        hint = "" if len(cells) > 1 else _BY_COMMAS
-        raise FileError(f"{place}: has {len(cells)} cells, the columns are {len(columns)}{hint}")
+def _places(names: Sequence[str], wanted: str) -> list[int]:
+    """Return the columns that hold what is wanted: those of that very name, or those like it."""
+    exact = [place for place, name in enumerate(names) if name == wanted]
+    if exact:
+        return exact
+    found = []
+    for place, name in enumerate(names):
+        bare = units.split_unit(name, _UNITS[wanted])[0].strip().lower()
+        if any(bare == alias or bare.endswith(f".{alias}") for alias in _ALIASES[wanted]):
+            found.append(place)
+    return found
+
+
+def _column(table: CsvTable, name: str) -> int:
+    names = table.names or ()
+    places = _places(names, name)
+    if len(places) != 1:
+        found = "is given twice" if places else "is missing"
+        got = f"got {', '.join(names)}" if names else "no line names the columns"
+        raise FileError(
+            f"{table.path}: line {table.names_line}: column {name} {found}; needed are "
+            f"{', '.join(COLUMNS)}, {got}; cells are read as separated {table.form.in_words}"
+        )
+    return places[0]
+
+
+def _factor(table: CsvTable, wanted: str, column: int) -> float:
+    """Return what a column's numbers are multiplied by to be in the SI unit."""
+    known = _UNITS[wanted]
+    name = (table.names or ())[column]
+    in_name = None if name == wanted else units.split_unit(name, known)[1]
+    below = table.unit(column)
+    stated = in_name or below
+    if not stated:
+        return 1.0
+    if in_name and below and units.plain(in_name) != units.plain(below):
+        raise FileError(
+            f"{table.path}: {table.title(column)} is in {in_name!r} by its name and in {below!r} "
+            "by the row of units"
+        )
+    factor = known.get(units.plain(stated))
+    if factor is None:
+        raise FileError(
+            f"{table.path}: {table.title(column)} is in {stated!r}; accepted are "
+            f"{', '.join(known)}"
+        )
+    if factor != 1.0:
+        table.notes.append(f"{table.title(column)} is in {stated}")
+    return factor
+
+
+def _row(table: CsvTable, row: int, columns: Sequence[int]) -> list[float] | None:
+    """Return the six numbers of a row in the order of COLUMNS; None of one that is left out."""
     values = []
-    for name in COLUMNS:
-        cell = cells[columns.index(name)]
-        try:
-            value = float(cell)
-        except ValueError:
-            raise FileError(f"{place}: column {name}: {cell!r} is not a number") from None
-        if not math.isfinite(value):
-            raise FileError(f"{place}: column {name}: must be finite, got {cell}")
-        if abs(value) > LARGEST:
-            raise FileError(
-                f"{place}: column {name}: must be at most {LARGEST:g} in size, got {cell}"
-            )
+    for column in columns:
+        value = table.number(row, column)
+        if value is None:
+            return None
         values.append(value)
     for what, part in (("wrench", values[:3]), ("twist", values[3:])):
+        if max(map(abs, part)) >= SMALLEST:
+            continue
+        if table.drop_bad:
+            return None
+        told = f"is below {SMALLEST:g} in size, too small for a direction"
         if not any(part):
-            raise FileError(f"{place}: the {what} is zero: it has no direction")
-        if max(map(abs, part)) < SMALLEST:
-            raise FileError(
-                f"{place}: the {what} is below {SMALLEST:g} in size, too small for a direction"
-            )
+            told = "is zero: it has no direction; --drop-bad leaves such rows out"
+        raise FileError(f"{table.path}: line {table.lines[row]}: the {what} {told}")
     return values

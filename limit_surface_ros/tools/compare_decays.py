@@ -88,6 +88,8 @@ def run(options: argparse.Namespace) -> None:
                 rows.append([method, str(terms), "refused", "", "", ""])
             progress(done, len(pairs))
     print(f"{given.source}, fitted on [0, {given.end:g}] s, infinity norm")
+    for note in given.notes:
+        print(note)
     for row in (HEADINGS, ["---"] * len(HEADINGS), *rows):
         print(f"| {' | '.join(row)} |")
     for method, reason in refusals.items():

@@ -15,8 +15,8 @@ from limit_surface_ros.decay.noise import resting_level
 from limit_surface_ros.decay.targets import Record
 from limit_surface_ros.errors import DataError, FileError, RangeError
 from limit_surface_ros.files.bag_reader import read_topic
-from limit_surface_ros.files.response_csv import read_response
 from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
+from limit_surface_ros.tools.csv_options import add_response_options, response_of_csv
 from limit_surface_ros.tools.training_data import is_bag
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ class DecayInput:
         horizon: Up to where errors beyond the interval are measured [s]; not below `end`.
         start: Of the response within its record [s].
         offset: What has been taken away from the record's values.
+        notes: How the record was read, in one line each.
     """
 
     def __init__(
@@ -56,6 +57,7 @@ class DecayInput:
         self.horizon = max(horizon, end)
         self.start = start
         self.offset = offset
+        self.notes: tuple[str, ...] = ()
 
     @property
     def samples(self) -> int | None:
@@ -104,8 +106,7 @@ def add_input_options(parser: argparse.ArgumentParser) -> None:
         help="what to take away from a record's values, such as a sensor's bias; `auto`: the "
         "constant at which the record ends",
     )
-    parser.add_argument("--time-column", metavar="NAME", help="default: the first column")
-    parser.add_argument("--value-column", metavar="NAME", help="default: the second column")
+    add_response_options(parser)
     parser.add_argument("--topic", metavar="NAME", help="of a bag")
     parser.add_argument(
         "--field",
@@ -132,6 +133,7 @@ def read_input(options: argparse.Namespace) -> DecayInput:
             f"{path}: no such file, and no example has that name; examples are "
             f"{', '.join(EXAMPLES)}"
         )
+    notes: tuple[str, ...] = ()
     if options.topic is not None:
         record = record_of_bag(path, options.topic, options.field)
     elif path.suffix.lower() in YAML_SUFFIXES:
@@ -142,8 +144,11 @@ def read_input(options: argparse.Namespace) -> DecayInput:
     elif is_bag(path):
         raise FileError(f"{path}: is a bag: say which topic to read, with --topic")
     else:
-        record = read_response(path, options.time_column, options.value_column)
-    return of_record(str(path), record, end, options.start, options.offset)
+        response = response_of_csv(path, options)
+        record, notes = response.record, response.notes
+    given = of_record(str(path), record, end, options.start, options.offset)
+    given.notes = notes
+    return given
 
 
 def record_of_bag(path: Path, topic: str, field: str | None) -> Record:

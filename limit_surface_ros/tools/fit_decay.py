@@ -26,6 +26,7 @@ from limit_surface_ros.decay.noise import resting_level
 from limit_surface_ros.decay.targets import Record
 from limit_surface_ros.files.decay_file import DecayModel, write_decay_model
 from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
+from limit_surface_ros.tools.csv_options import OF_RESPONSES
 from limit_surface_ros.tools.decay_input import add_input_options, read_input
 from limit_surface_ros.tools.given_options import refuse_empty, refuse_unused
 from limit_surface_ros.tools.output_file import check_output
@@ -36,7 +37,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from limit_surface_ros.decay.fit import DecayFit
-    from limit_surface_ros.tools.decay_input import DecayInput
+    from limit_surface_ros.tools.csv_options import OF_RESPONSES
+from limit_surface_ros.tools.decay_input import DecayInput
 
 EXAMPLES = """methods:
   dde       characteristic roots of the response's own delay system (the thesis); its maximum
@@ -176,6 +178,7 @@ def report(result: DecayFit, given: DecayInput) -> None:
     where = "" if given.samples is None else f"at the {given.samples} samples "
     rows = [
         ("response", given.source + (f" less {given.offset:.6g}" if given.offset else "")),
+        *(("read", note) for note in given.notes),
         ("method", choice.method + (f" ({chosen})" if chosen else "")),
         ("terms", f"{fit.sum.terms} real ({len(fit.sum.rates)} rates)"),
         ("error", f"{fit.max_error:.4e} {where}on [0, {given.end:g}] s"),
@@ -253,7 +256,7 @@ def refuse_options_of_others(options: argparse.Namespace) -> None:
     if not is_bag(Path(options.input)):
         refuse_unused(top, options, ["topic", "field"], "for a bag")
     if options.input in RESPONSES or is_bag(Path(options.input)):
-        refuse_unused(top, options, ["time_column", "value_column"], "for a CSV file")
+        refuse_unused(top, options, OF_RESPONSES, "for a CSV file")
     if options.method != "dde":
         refuse_unused(top, options, ["max_delay", "degree", "allow_unstable"], "for --method dde")
     if options.method not in ("neutral", "best"):

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from limit_surface_ros.files.bag_pushes import Selection
+from limit_surface_ros.tools.csv_options import OF_CELLS
 from limit_surface_ros.tools.given_options import refuse_unused
 from limit_surface_ros.tools.surface_fit import objective_of
 from limit_surface_ros.tools.training_data import BAG, CONTACT, PUSHES
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 OF_INPUTS = {
     CONTACT: ("motions", "facet_loads", "load_noise", "motion_noise"),
-    PUSHES: ("rows",),
+    PUSHES: ("rows", *OF_CELLS),
     BAG: ("wrench_topic", "motion_topic", *asdict(Selection())),
 }
 CHOSEN_BY_AUTO = ("kind", "terms", "family", "objective", "velocity_weight", "starts")

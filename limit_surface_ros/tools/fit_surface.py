@@ -76,6 +76,8 @@ def parser() -> argparse.ArgumentParser:
 def report(fitted: FittedModel, output: Path) -> None:
     """Print what was dropped, cost, errors and time."""
     result = fitted.result
+    for note in fitted.model.fit.get("read", ()):
+        print(f"read        {note}")
     for rule, count in fitted.model.fit.get("dropped", {}).items():
         if count:
             print(f"dropped     {count} of {fitted.model.fit['wrenches']} wrenches {rule}")

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 from limit_surface_ros.decay.examples import EXAMPLES, example
 from limit_surface_ros.errors import FileError
 from limit_surface_ros.files.decay_file import read_decay_model
-from limit_surface_ros.files.response_csv import read_response
 from limit_surface_ros.plots.canvas import save_figure
 from limit_surface_ros.plots.decay_view import PROJECTION, draw_decay
+from limit_surface_ros.tools.csv_options import add_response_options, response_of_csv
 from limit_surface_ros.tools.decay_input import after, without
 from limit_surface_ros.tools.picture_options import add_picture_options, check_picture
 from limit_surface_ros.tools.program import run_program
@@ -50,8 +50,7 @@ def parser() -> argparse.ArgumentParser:
         metavar="X",
         help=f"what the model stands for: an example ({', '.join(EXAMPLES)}) or a CSV file",
     )
-    top.add_argument("--time-column", metavar="NAME", help="default: the first column")
-    top.add_argument("--value-column", metavar="NAME", help="default: the second column")
+    add_response_options(top.add_argument_group("a CSV file of --response"))
     return top
 
 
@@ -66,7 +65,7 @@ def response_of(model: DecayModel, options: argparse.Namespace) -> Target | None
         return example(name)
     path = Path(name)
     if path.is_file():
-        record = read_response(path, options.time_column, options.value_column)
+        record = response_of_csv(path, options).record
         return without(after(record, _stated(model, "start")), _stated(model, "offset"))
     if options.response:
         raise FileError(

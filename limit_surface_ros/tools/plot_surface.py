@@ -18,6 +18,7 @@ from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
 from limit_surface_ros.plots.canvas import save_figure
 from limit_surface_ros.plots.surface_view import draw_surfaces
 from limit_surface_ros.surface.sampling import facet_loads, random_motions
+from limit_surface_ros.tools.csv_options import add_cell_options, cell_options
 from limit_surface_ros.tools.picture_options import add_picture_options, check_picture
 from limit_surface_ros.tools.program import run_program
 from limit_surface_ros.tools.same_point import About, require_one_point
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.files.csv_table import CsvOptions
     from limit_surface_ros.surface.base import LimitSurface
 
 # Loads that are simulated of a contact; of many points the facets are too small to be seen.
@@ -60,10 +62,11 @@ def parser() -> argparse.ArgumentParser:
         metavar="FILE",
         help="recorded pushes (.csv), or a contact file (.yaml) of which loads are simulated",
     )
+    add_cell_options(top.add_argument_group("a CSV file of --data"))
     return top
 
 
-def loads_of(path: Path) -> tuple[Floats, About | None]:
+def loads_of(path: Path, cells: CsvOptions) -> tuple[Floats, About | None]:
     """Return the loads that data give: recorded ones, or those of a contact.
 
     Returns:
@@ -73,7 +76,7 @@ def loads_of(path: Path) -> tuple[Floats, About | None]:
         FileError: The file is no valid one of its suffix.
     """
     if path.suffix.lower() not in YAML_SUFFIXES:
-        return read_pushes(path).pairs.wrenches, None
+        return read_pushes(path, cells).pairs.wrenches, None
     contact = read_contact(path)
     loads = [random_motions(contact.surface, MOTIONS, 0).wrenches]
     if len(contact.surface.points) <= FEW_POINTS:
@@ -95,7 +98,7 @@ def run(options: argparse.Namespace) -> None:
         stated.append(About(path, model.frame_id, model.reference_point))
     loads = None
     if options.data is not None:
-        loads, about = loads_of(options.data)
+        loads, about = loads_of(options.data, cell_options(options))
         stated += [about] if about is not None else []
     require_one_point(stated)
     save_figure(draw_surfaces(surfaces, loads), options.output, options.dpi)

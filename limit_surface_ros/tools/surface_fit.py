@@ -21,6 +21,7 @@ from limit_surface_ros.fitting.power_sum import fit_power_sum
 from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.second_approximation import fit_second_approximation
 from limit_surface_ros.surface.kinds.power_sum import thesis_exponents
+from limit_surface_ros.tools.csv_options import add_cell_options, cell_options
 from limit_surface_ros.tools.given_options import check_ranges
 from limit_surface_ros.tools.training_data import (
     BAG,
@@ -162,6 +163,7 @@ def _add_data_options(data: argparse._ArgumentGroup) -> None:
     data.add_argument(
         "--rows", help="rows of a CSV to fit, such as 0,3,10-14; others are held out"
     )
+    add_cell_options(data)
     data.add_argument(
         "--characteristic-length",
         type=float,
@@ -282,7 +284,7 @@ def read_input(path: Path, options: argparse.Namespace) -> TrainingData:
             options.seed,
         )
         return training_data_of_contact(path, simulation, options.characteristic_length)
-    return training_data_of_pushes(path, options.rows)
+    return training_data_of_pushes(path, options.rows, cell_options(options))
 
 
 def fit(options: argparse.Namespace, data: TrainingData, search: Search) -> FitResult:

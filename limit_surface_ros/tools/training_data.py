@@ -22,11 +22,14 @@ from limit_surface_ros.surface.scaling import Scaling
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from limit_surface_ros.files.csv_table import CsvOptions
     from limit_surface_ros.surface.pairs import Pairs
 
 # What an input can be, as messages call it.
 CONTACT, PUSHES, BAG = "a contact file", "a CSV of pushes", "a bag"
 SUFFIXES = (*YAML_SUFFIXES, ".csv")
+# Other ends of names that tables in text have.
+TABLE_SUFFIXES = (".csv", ".tsv", ".txt", ".dat")
 BAG_SUFFIXES = (".mcap", ".db3")
 ACCEPTED = "a contact file (.yaml, .yml), recorded pushes (.csv), or a ROS 2 bag"
 
@@ -99,7 +102,9 @@ def row_numbers(text: str, count: int) -> list[int]:
     return numbers
 
 
-def training_data_of_pushes(path: Path, selected: str | None) -> TrainingData:
+def training_data_of_pushes(
+    path: Path, selected: str | None, cells: CsvOptions | None = None
+) -> TrainingData:
     """Read recorded pushes; the rows that are not selected are held out.
 
     The first line's `rho_m` [m] gives the characteristic length where it stands.
@@ -107,17 +112,21 @@ def training_data_of_pushes(path: Path, selected: str | None) -> TrainingData:
     Args:
         path: The CSV.
         selected: Its rows to fit, see `row_numbers`; all if not given.
+        cells: How its cells are written, and what becomes of bad rows.
 
     Raises:
         FileError: The file is absent or not valid.
         DataError: There are no such rows.
     """
-    pushes = read_pushes(path)
+    pushes = read_pushes(path, cells)
     with naming(path):
         rows = None if selected is None else row_numbers(selected, len(pushes.pairs))
     training = pushes.pairs if rows is None else pushes.rows(rows)
     others = len(pushes.pairs) - len(training)
     support = pushes.support()
+    about: dict[str, Any] = {"data": path.name, "rows": "all" if rows is None else rows}
+    if pushes.notes:
+        about["read"] = list(pushes.notes)
     return TrainingData(
         training=training,
         support=None if support is None else PointContacts(*support),
@@ -125,7 +134,7 @@ def training_data_of_pushes(path: Path, selected: str | None) -> TrainingData:
         characteristic_length=pushes.number("rho_m"),
         normal_force=pushes.number("normal_force_N"),
         recorded=True,
-        about={"data": path.name, "rows": "all" if rows is None else rows},
+        about=about,
     )
 
 
@@ -241,7 +250,7 @@ def check_input(path: Path) -> str:
             raise FileError(
                 f"{path}: is a folder without a metadata.yaml, so no bag; accepted is {ACCEPTED}"
             )
-    elif suffix not in (*SUFFIXES, *BAG_SUFFIXES):
+    elif suffix not in (*SUFFIXES, *TABLE_SUFFIXES, *BAG_SUFFIXES):
         found = f"files that end in {suffix} are" if suffix else "a file without a suffix is"
         raise FileError(f"{path}: {found} not known; accepted is {ACCEPTED}")
     return kind_of_input(path)

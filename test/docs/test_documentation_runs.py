@@ -192,7 +192,7 @@ def test_every_file_that_is_shown_is_read(tmp_path, page, language, text):
     elif "fx_N" in text:
         assert len(read_pushes(path).pairs) == 2
     else:
-        assert len(read_response(path).knots) == 2
+        assert len(read_response(path).record.knots) == 2
 
 
 def test_both_descriptions_of_contacts_and_both_sorts_of_csv_are_shown():

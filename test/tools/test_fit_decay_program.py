@@ -87,9 +87,13 @@ def test_a_column_is_chosen_by_its_name(tmp_path):
 @pytest.mark.parametrize(
     ("text", "extra", "message"),
     [
-        ("t,x\n0,1\n1,oops\n", [], "line 3: 'oops' is no finite number\n"),
-        ("t,x\n0,1\n1,nan\n", [], "line 3: 'nan' is no finite number\n"),
-        ("t,x\n0,1\n", [], "holds 1 samples"),
+        ("t,x\n0,1\n1,oops\n", [], "line 3: column x: 'oops' is no finite number\n"),
+        (
+            "t,x\n0,1\n1,nan\n",
+            [],
+            "line 3: column x: 'nan' is no finite number; --drop-bad leaves",
+        ),
+        ("t,x\n0,1\n", [], "holds 1 sample;"),
         ("", [], "holds no rows"),
         ("t,x\n0,0\n1,1\n", [], "x(0) must not be zero"),
         ("t,x\n0,1\n0,0.5\n", [], "times must increase"),
@@ -97,11 +101,9 @@ def test_a_column_is_chosen_by_its_name(tmp_path):
         ("t,x\n0,1\n1,0.5\n", ["--end", "5"], "ends at 1 s"),
         ("t,x\n0,1\n1,0.5\n", ["--end", "-5"], "--end"),
         ("t\n0\n1\n", [], "has no column 2"),
-        ("0;1\n1;0.5\n", [], "cells are separated by commas"),
-        ("t;x\n0,0;1,0\n1,0;0,5\n", [], "line 2: '0;1' is no finite number; cells are separated"),
-        ("t,x\n0,1\n1,1e300\n", [], "line 3: 1e300 is beyond 1e+100"),
+        ("t,x\n0,1\n1,1e300\n", [], "line 3: column x: 1e300 is beyond 1e+100"),
         ("t,x\n0,1e-300\n1,1e-301\n", [], "values must be between 1e-100 and 1e+100"),
-        ("t [h],x\n0,1\n1,0.5\n", [], "times are in 'h' by the column's name 't [h]'"),
+        ("t [d],x\n0,1\n1,0.5\n", [], "times are in 'd' by the column's name 't [d]'"),
         ("t,x\n0,1\n1," + "1" * 200_000, [], "line 3: is not a row of CSV: field larger"),
     ],
 )
@@ -122,7 +124,7 @@ def test_times_are_read_in_the_unit_that_their_column_states(tmp_path, name, uni
     record = tmp_path / "record.csv"
     rows = [f"{t / unit},{np.exp(-t)}" for t in np.linspace(0.0, 4.0, 41)]
     record.write_text("\n".join([f"{name},x", *rows]))
-    assert read_response(record).knots[-1] == pytest.approx(4.0)
+    assert read_response(record).record.knots[-1] == pytest.approx(4.0)
 
 
 def test_yaml_is_no_record(tmp_path, capsys):
