@@ -67,7 +67,10 @@ def test_a_model_is_fitted_and_written_with_its_history(pushes, tmp_path, capsys
     [
         (lambda lines: [lines[0].replace("vx", "speed"), *lines[1:]], "column vx is missing"),
         (lambda lines: [*lines[:5], "a" + lines[5], *lines[6:]], "line 6: column fx_N"),
-        (lambda lines: [*lines, "nan,1,1,1,1,1"], "line 62: column fx_N: must be finite"),
+        (
+            lambda lines: [*lines, "nan,1,1,1,1,1"],
+            "line 62: column fx_N: 'nan' is no finite number",
+        ),
         (lambda lines: lines[:10], "9 pairs cannot determine 18 parameters"),
         (lambda lines: [lines[0], *([lines[1]] * 60)], "all motions go in one direction"),
         (
