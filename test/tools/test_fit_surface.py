@@ -264,10 +264,10 @@ def test_rows_of_a_contact_are_refused(tmp_path, capsys):
 
 
 def test_an_unknown_input_is_refused(tmp_path, capsys):
-    other = tmp_path / "data.txt"
+    other = tmp_path / "data.png"
     other.touch()
     assert main([str(other), "-o", str(tmp_path / "m.yaml")]) == 2
-    assert "files that end in .txt are not known; accepted is" in capsys.readouterr().err
+    assert "files that end in .png are not known; accepted is" in capsys.readouterr().err
     assert main([str(tmp_path / "none.csv"), "-o", str(tmp_path / "m.yaml")]) == 2
     assert "there is no such file" in capsys.readouterr().err
     loop = tmp_path / "loop.csv"
