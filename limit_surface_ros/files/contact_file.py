@@ -24,7 +24,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.files.yaml_reader import place_errors, read_yaml
+from limit_surface_ros.files.section import place_errors
+from limit_surface_ros.files.yaml_reader import read_yaml
 from limit_surface_ros.surface.contact import pressure as pressures
 from limit_surface_ros.surface.contact import shapes
 from limit_surface_ros.surface.contact.patch import ContactPatch, natural_scaling
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.files.yaml_reader import Section
+    from limit_surface_ros.files.section import Section
     from limit_surface_ros.surface.contact.pressure import Pressure
     from limit_surface_ros.surface.contact.shapes import Cells
 

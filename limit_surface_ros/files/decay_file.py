@@ -32,7 +32,8 @@ from limit_surface_ros.decay.delay.pieces import PiecewisePolynomial
 from limit_surface_ros.decay.delay.system import DelaySystem
 from limit_surface_ros.decay.exponential_sum import ExponentialSum
 from limit_surface_ros.errors import RangeError
-from limit_surface_ros.files.yaml_reader import Section, place_errors, read_yaml, write_yaml
+from limit_surface_ros.files.section import Section, place_errors
+from limit_surface_ros.files.yaml_reader import read_yaml, write_yaml
 
 if TYPE_CHECKING:
     from pathlib import Path

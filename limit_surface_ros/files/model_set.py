@@ -11,14 +11,16 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
+from limit_surface_ros.checks import shortened
 from limit_surface_ros.errors import FileError, UnknownModelError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
 
-# Names in a message; thousands would drown the rest of it.
+# Names in a message, and characters of each; thousands would drown the rest of it.
 _LISTED = 20
+_NAME = 80
 
 
 class Named(Protocol):
@@ -67,7 +69,7 @@ class ModelSet(Generic[Model]):
             return self._models[name or self.default]
         except KeyError:
             raise UnknownModelError(
-                f"no {self._noun} {name!r} is loaded; loaded are {self.listed()}"
+                f"no {self._noun} {shortened(repr(name))} is loaded; loaded are {self.listed()}"
             ) from None
 
     def __iter__(self) -> Iterator[Model]:
@@ -80,7 +82,7 @@ class ModelSet(Generic[Model]):
 
     def listed(self) -> str:
         """Return the names of the models for people: the first few, and how many more."""
-        names = [*islice(self._models, _LISTED)]
+        names = [shortened(name, _NAME) for name in islice(self._models, _LISTED)]
         if len(self) > _LISTED:
             names[-1] += f" and {len(self) - _LISTED} more"
         return ", ".join(names)
@@ -144,7 +146,8 @@ def read_model_set(
         model = read(path)
         if model.name in models:
             raise FileError(
-                f"{path}: holds a model named {model.name!r}, as {places[model.name]} does: "
+                f"{path}: holds a model named {shortened(repr(model.name))}, as "
+                f"{places[model.name]} does: "
                 "names must differ"
             )
         models[model.name], places[model.name] = model, path

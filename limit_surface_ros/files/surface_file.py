@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 from limit_surface_ros.checks import as_positive
 from limit_surface_ros.errors import RangeError
-from limit_surface_ros.files.yaml_reader import Section, place_errors, read_yaml, write_yaml
+from limit_surface_ros.files.section import Section, place_errors
+from limit_surface_ros.files.yaml_reader import read_yaml, write_yaml
 from limit_surface_ros.surface.convexity import Convexity, is_convex, warn_unless_convex
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts

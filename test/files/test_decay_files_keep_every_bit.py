@@ -99,7 +99,7 @@ def test_files_of_limit_surfaces_are_sent_to_the_right_program(tmp_path, text, p
         ("kind", "power_sum", "kind: must be one of exponential_sum"),
         ("name", None, "name: missing"),
         ("rates", "[[.nan, 0.0]]", "rates.*finite"),
-        ("rates", "[[1e-3, 0.0]]", "rates.*write it as the number 0.001"),
+        ("rates", "[['0.001', 0.0]]", "rates.*write it as the number 0.001"),
         ("rates", "[[-1.0, -2.0]]", "rates: .*Im >= 0"),
         ("rates", "[[0.5, 0.0]]", "rates: .*must decay"),
         ("rates", "[-1.0]", "rates: must be an array of n x 2"),

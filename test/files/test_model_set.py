@@ -46,6 +46,12 @@ def test_of_thousands_of_models_a_message_lists_a_few():
     assert len(str(refused.value)) < 400
 
 
+def test_of_a_name_as_long_as_a_message_a_part_is_shown():
+    with pytest.raises(UnknownModelError) as refused:
+        ModelSet(named("m" * 1_000_000))["n" * 1_000_000]
+    assert len(str(refused.value)) < 400
+
+
 def test_no_model_at_all_is_refused():
     with pytest.raises(FileError, match="no model file is given"):
         read_model_set([], read)

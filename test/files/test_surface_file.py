@@ -77,8 +77,8 @@ def test_a_file_cut_short_anywhere_is_refused(tmp_path, surface):
         ("friction_force: 1.0", "friction_force: -1.0", "friction_force: must be at least 1e-12"),
         (
             "friction_force: 1.0",
-            "friction_force: 1e3",
-            "friction_force: '1e3' is text in YAML",
+            "friction_force: '1000'",
+            "friction_force: '1000' is text; write it as the number 1000.0",
         ),
         ("terms: 1", "terms: 2", "matrices: must be an array of 2 x 3 x 3 numbers"),
         ("exponents: [1.0]", "exponents: [1.0, 0.5]", "exponents: must be an array of 1"),

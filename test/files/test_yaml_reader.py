@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from limit_surface_ros.checks import LARGEST
 from limit_surface_ros.errors import FileError
 from limit_surface_ros.files.atomic_write import write_atomically
-from limit_surface_ros.files.yaml_reader import read_yaml, write_yaml
+from limit_surface_ros.files.yaml_reader import _Loader, read_yaml, write_yaml
 
 
 @pytest.fixture
@@ -29,7 +29,11 @@ def section_of(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("x: 1e-3", r"model.yaml: x: '1e-3' is text in YAML 1.1; write it as the number 0.001"),
+        ("x: '0.5'", r"model.yaml: x: '0.5' is text; write it as the number 0.5"),
+        ("x: 0,5", r"x: must be a number, got '0,5'; write it with a decimal point"),
+        ("x: 35 mm", r"x: must be a number, got '35 mm'; write the number alone: lengths are me"),
+        ("x: 1e-3m", r"got '1e-3m'; write the number alone"),
+        ("x: much", r"x: must be a number, got 'much'$"),
         ("x: .nan", "x: must be finite, got nan"),
         ("x: -.inf", "x: must be finite, got -inf"),
         ("x: true", "x: must be a number, got True"),
@@ -52,7 +56,7 @@ def test_a_number_that_is_not_acceptable_is_refused_with_its_key(section_of, tex
     [
         ("m: [[1, 2], [3]]", "m: its rows must have one length"),
         ("m: [[1, 2], [3, .nan]]", r"m\[1\]\[1\]: must be finite, got nan"),
-        ("m: [[1, 2], [3, 1e5]]", r"m\[1\]\[1\]: '1e5' is text in YAML 1.1"),
+        ("m: [[1, 2], [3, '5']]", r"m\[1\]\[1\]: '5' is text; write it as the number 5.0"),
         ("m: [1, 2]", "m: must be an array of n x 2 numbers, got 2"),
         ("m: []", "m: must be an array of n x 2 numbers, got 0"),
         ("m: 4.0", "m: must be an array of n x 2 numbers, got a single number"),
@@ -130,9 +134,96 @@ def test_a_number_or_array_nested_however_deep_is_refused_in_few_words(section_o
 
 def test_anchors_that_repeat_each_other_cost_no_memory(section_of):
     laughs = ["&x0 [1, 1]", *(f"&x{i} [{', '.join([f'*x{i - 1}'] * 9)}]" for i in range(1, 30))]
-    section = section_of("\n".join(f"a{i}: {laugh}" for i, laugh in enumerate(laughs)))
-    with pytest.raises(FileError, match=r"a29\[0\]\[0\]\[0\]: must be a number"):
-        section.array("a29", (None, 2))
+    text = "\n".join(f"a{i}: {laugh}" for i, laugh in enumerate(laughs))
+    with pytest.raises(FileError, match=r"line 7, .*: aliases stand for more than 1000000 values"):
+        section_of(text)
+
+
+def test_aliases_that_repeat_little_are_read(section_of):
+    assert section_of("a: &a [1, 2]\nb: [*a, *a]").array("b", (2, 2)).tolist() == [[1, 2]] * 2
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("fit: &f {a: *f}", "line 1, column 13"),
+        ("a: &x [1, [*x]]", "line 1, column 12"),
+        ("&top\na: [1]\nb: *top", "line 3, column 4"),
+        ("? &k [*k]\n: 1", "line 1, column 7"),
+    ],
+)
+def test_what_refers_to_itself_is_refused_with_its_place(section_of, text, place):
+    with pytest.raises(FileError, match=rf"model\.yaml: {place}: \*\w+ refers to what it is"):
+        section_of(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "number"), [("1e-3", 1e-3), ("1E5", 1e5), ("-2.5e6", -2.5e6), ("+1.e+2", 100.0)]
+)
+def test_powers_of_ten_are_numbers_with_and_without_a_point_and_a_sign(section_of, text, number):
+    section = section_of(f"x: {text}\nm: [{text}]\nname: {text}")
+    assert section.number("x") == section.array("m", (1,))[0] == number
+
+
+def test_a_whole_number_may_be_a_power_of_ten(section_of):
+    section = section_of("x: 1e3\ny: 1e-3\nz: 2.5e1")
+    assert section.integer("x") == 1000
+    assert section.integer("z") == 25
+    with pytest.raises(FileError, match="y: must be a whole number from 0 on, got '1e-3'"):
+        section.integer("y")
+
+
+class Compared(str):
+    """A text that counts how often it is compared."""
+
+    __slots__ = ()
+    __hash__ = str.__hash__
+    times = 0
+
+    def __eq__(self, other):
+        Compared.times += 1
+        return str.__eq__(self, other)
+
+
+def test_keys_are_compared_in_linear_time(section_of, monkeypatch):
+    # Twenty thousand were compared two hundred million times, which took four seconds.
+    construct = _Loader.construct_object
+
+    def comparable(self, node, deep=False):
+        value = construct(self, node, deep)
+        return Compared(value) if isinstance(value, str) else value
+
+    monkeypatch.setattr(_Loader, "construct_object", comparable)
+    keys = [f"key_{i}" for i in range(20_000)]
+    assert len(section_of("\n".join(f"{key}: 1" for key in keys)).values) == len(keys)
+    assert Compared.times < 10 * len(keys)
+    with pytest.raises(FileError, match="line 20001, column 1: key 'key_7' is given twice"):
+        section_of("\n".join(f"{key}: 1" for key in [*keys, "key_7"]))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("? [1]\n: 2", "a key must be a text"),
+        (f"{2**61 - 1}{'0' * 20}: 2", "a key must be a text, and not a number of that size"),
+        (f"? {'[' * 90}1{']' * 90}\n: 2", "a key must be a text"),
+        (f"x: {'9' * 1001}", "a number of 1001 digits; at most 1000 are read"),
+        ("a:\n\tb: 1", "line 2, column 1: .*; a tab stands there, and YAML wants spaces"),
+    ],
+)
+def test_keys_digits_and_tabs_that_are_not_acceptable_are_named(section_of, text, message):
+    with pytest.raises(FileError, match=message):
+        section_of(text)
+
+
+def test_a_key_as_long_as_a_file_is_shown_in_part(section_of):
+    key = "k" * 1_000_000
+    with pytest.raises(FileError) as refused:
+        section_of(f"{key}: 1").finish()
+    assert len(str(refused.value)) < 500
+    with pytest.raises(FileError) as refused:
+        section_of(f"? {key}\n: 1\n? {key}\n: 1")
+    assert len(str(refused.value)) < 500
 
 
 @pytest.mark.parametrize("number", ["1:30", "-1:30", "190:20:30.5", "010", "-017"])
