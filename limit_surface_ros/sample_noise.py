@@ -76,8 +76,12 @@ def _noise_of_order(times: Floats, values: Floats, order: int) -> float:
 
 
 def _rounding_noise(values: Floats) -> float:
-    """Return the noise that rounding makes; 0 if fewer than half of the values repeat others."""
-    distinct = np.unique(values)
-    if len(distinct) < 2 or 2 * len(distinct) >= len(values):
+    """Return the noise that rounding makes; 0 if fewer than half of the values repeat others.
+
+    Rounded values share most of their levels; a response that is constant for a while has one or
+    two levels that many values share, and others that none do.
+    """
+    distinct, counts = np.unique(values, return_counts=True)
+    if len(distinct) < 2 or 2 * len(distinct) >= len(values) or np.median(counts) < 2:
         return 0.0
     return float(np.diff(distinct).min()) / math.sqrt(12.0)

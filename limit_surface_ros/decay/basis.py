@@ -66,6 +66,12 @@ def count_terms(rates: Complexes) -> int:
     return len(rates) + int(np.count_nonzero(rates.imag))
 
 
+def constant_columns(rates: Complexes) -> Bools:
+    """Mark the columns of `real_basis` that are constant, shape (terms,)."""
+    marks: Bools = np.repeat(rates == 0.0, 2)[_used_columns(rates)]
+    return marks
+
+
 def real_basis(rates: Complexes, times: Floats) -> Floats:
     """Return the real terms at the given times.
 

@@ -19,10 +19,11 @@ import numpy as np
 from scipy import optimize
 
 from limit_surface_ros.checks import as_floats, as_positive
-from limit_surface_ros.decay.basis import as_rates, real_basis
+from limit_surface_ros.decay.basis import as_rates, constant_columns, real_basis
 from limit_surface_ros.decay.exponential_sum import ExponentialSum
 from limit_surface_ros.decay.grids import error_at, fit_times, highest_error, largest_error
 from limit_surface_ros.decay.minimax import orthonormal_basis, solve_minimax
+from limit_surface_ros.decay.tail import tail_times, tail_weight
 from limit_surface_ros.decay.targets import Record
 from limit_surface_ros.errors import RangeError, ShapeError, SolverError
 
@@ -37,6 +38,10 @@ Criterion: TypeAlias = Callable[["Floats"], float]
 NORMS = ("inf", "2", "1")
 # Rounds of adding the worst times of a grid to those that are fitted.
 MOST_EXCHANGES = 8
+# A sum is held after the end if it is there so many times as large as it may be.
+OVER = 1.01
+HOLDING_ROUNDS = 3
+BISECTIONS = 12
 
 
 @dataclass(frozen=True)
@@ -194,6 +199,7 @@ def fit_response(
     response: Target,
     end: float,
     norm: str | Criterion = "inf",
+    envelope: float | None = None,
 ) -> ResponseFit:
     """Fit the coefficients of exponentials with the given rates to a response on [0, end].
 
@@ -202,6 +208,9 @@ def fit_response(
         response: The response, with its breakpoints.
         end: End of the interval [s].
         norm: As in `fit_coefficients`.
+        envelope: After the end the sum, less its constant, is held to this, or to its error if
+            that is larger; it is free there if None. A sum that stays there by itself is not
+            changed.
 
     Raises:
         ShapeError: The rates are no list of numbers.
@@ -214,13 +223,16 @@ def fit_response(
     if not callable(norm) and norm not in NORMS:
         raise RangeError(f"norm must be one of {', '.join(NORMS)} or a function, got {norm!r}")
     fit = _fitted(lambdas, response, span, norm)
+    if envelope is not None and _leaves(fit, envelope):
+        fit = _held(fit, lambdas, response, norm, envelope)
+        return replace(fit, max_error=largest_error(fit.sum, response, 0.0, span))
     if not isinstance(response, Record):
         return fit
     if fit.max_error > error_at(fit.sum, response, fit_times(response, span, 0.0)):
         # Few samples leave the sum free between them: let straight lines hold it there.
         held = _fitted(lambdas, response.lines, span, norm)
         error = largest_error(held.sum, response, 0.0, span)
-        if error < fit.max_error:
+        if error < fit.max_error and (envelope is None or not _leaves(held, envelope)):
             return replace(held, max_error=error)
     return fit
 
@@ -238,10 +250,75 @@ def _fitted(rates: Complexes, response: Target, end: float, norm: str | Criterio
     return ResponseFit(x, name, end, error, value, bound)
 
 
+def _leaves(fit: ResponseFit, envelope: float) -> bool:
+    """Tell whether a sum is larger after the end than both the envelope and its own error."""
+    x = fit.sum.without_constant()
+    return x.settles and x.supremum(fit.end) > OVER * max(envelope, fit.max_error)
+
+
+def _held(
+    free: ResponseFit,
+    rates: Complexes,
+    response: Target,
+    norm: str | Criterion,
+    envelope: float,
+) -> ResponseFit:
+    """Return a fit whose sum does not leave the envelope after the end.
+
+    In the infinity norm times after the end are rows beside the errors. In any other norm the
+    coefficients lie between those and the free ones, as near to these as the supremum permits,
+    which is a convex function of them.
+    """
+    times, after = fit_times(response, free.end, 0.0), tail_times(rates, free.end)
+    if not isinstance(response, Record):
+        times = fit_times(response, free.end, float(np.abs(rates.imag).max()))
+    basis, target = real_basis(rates, times), response(times)
+    tail = real_basis(rates, after)
+    tail[:, constant_columns(rates)] = 0.0
+    error = free.max_error
+    for _ in range(HOLDING_ROUNDS):
+        rows = tail * tail_weight(error, envelope)
+        held, value, bound = exchange(basis, target, response, times, rows)
+        error = float(np.abs(basis @ held - target).max())
+    x = ExponentialSum.from_weights(rates, held)
+    if norm == "inf":
+        return replace(free, sum=x, grid_error=value, lower_bound=bound)
+    limit = OVER * max(envelope, error, x.without_constant().supremum(free.end))
+    low, high = 0.0, 1.0
+    for _ in range(BISECTIONS):
+        share = 0.5 * (low + high)
+        x = ExponentialSum.from_weights(rates, (1.0 - share) * free.sum.weights + share * held)
+        inside = x.without_constant().supremum(free.end) <= limit
+        low, high = (low, share) if inside else (share, high)
+    weights = (1.0 - high) * free.sum.weights + high * held
+    value = norm_of(basis @ weights - target, norm)
+    return replace(free, sum=ExponentialSum.from_weights(rates, weights), grid_error=value)
+
+
+def norm_of(errors: Floats, norm: str | Criterion) -> float:
+    """Return the value of a norm, or of a criterion, of errors of shape (n,)."""
+    if callable(norm):
+        return float(norm(errors))
+    return float(np.linalg.norm(errors, {"inf": np.inf, "2": 2, "1": 1}[norm]))
+
+
 def exchange(
-    basis: Floats, target: Floats, response: Target, times: Floats
+    basis: Floats,
+    target: Floats,
+    response: Target,
+    times: Floats,
+    rows: Floats | None = None,
 ) -> tuple[Floats, float, float]:
-    """Minimise the largest error on all times by solving on few of them, adding the worst."""
+    """Minimise the largest error on all times by solving on few of them, adding the worst.
+
+    Args:
+        basis: Shape (n, terms), the terms at the times.
+        target: Shape (n,).
+        response: Whose breakpoints are among the first times.
+        times: Shape (n,) [s].
+        rows: Shape (k, terms), further rows whose target is 0; none if None.
+    """
+    more = np.zeros((0, basis.shape[1])) if rows is None else rows
     count, terms = basis.shape
     stride = max(1, count // max(400, 10 * terms))
     chosen = np.zeros(count, dtype=bool)
@@ -251,7 +328,9 @@ def exchange(
         kinks = np.isin(times, response.breakpoints)
         chosen |= kinks | np.roll(kinks, 1) | np.roll(kinks, -1)
     for _ in range(MOST_EXCHANGES):
-        weights, value, bound = solve(basis[chosen], target[chosen], "inf")
+        matrix = np.concatenate([basis[chosen], more])
+        aims = np.append(target[chosen], np.zeros(len(more)))
+        weights, value, bound = solve(matrix, aims, "inf")
         errors = np.abs(basis @ weights - target)
         worst = float(errors.max())
         if worst <= value * (1.0 + 1e-4) + 1e-14:

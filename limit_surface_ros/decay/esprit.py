@@ -41,6 +41,8 @@ RANK_TOLERANCE = 1e-13
 WINDOWS = (2.0, 6.0)
 # Rates that ESPRIT leaves undamped are given this much decay over the interval.
 LEAST_DECAY = 1e-3
+# A record is continued by its last value, which then decays so many times over its length.
+CONTINUED_TO, CONTINUED_DECAYS = 1.4, 30.0
 
 
 def esprit(values: ArrayLike, step: float, terms: int) -> Complexes:
@@ -64,19 +66,35 @@ def esprit(values: ArrayLike, step: float, terms: int) -> Complexes:
         raise RangeError(f"terms must be at least 1, got {terms}")
     if x.ndim != 1 or len(x) < max(3, 2 * terms):
         raise ShapeError(f"{terms} terms need at least {max(3, 2 * terms)} samples, got {x.shape}")
-    half = (len(x) + 1) // 2
+    return rates_of_subspace(signal_subspace(x, terms), terms, dt)
+
+
+def signal_subspace(samples: Floats, most: int) -> Floats:
+    """Return the dominant singular vectors of uniform samples' Hankel matrix, the largest first.
+
+    Args:
+        samples: Shape (n,), n >= 3.
+        most: Most vectors that are returned; fewer where the samples have not that rank.
+    """
+    half = (len(samples) + 1) // 2
     # Square and real, the Hankel matrix is symmetric: its eigenvectors are the singular vectors.
-    hankel = linalg.hankel(x[:half], x[half - 1 : 2 * half - 1])
+    hankel = linalg.hankel(samples[:half], samples[half - 1 : 2 * half - 1])
     eigenvalues, vectors = linalg.eigh(hankel, check_finite=False)
     order = np.argsort(-np.abs(eigenvalues))
     sizes = np.abs(eigenvalues[order])
-    rank = min(terms, int(np.count_nonzero(sizes > RANK_TOLERANCE * sizes[0])), half - 1)
-    subspace = vectors[:, order[:rank]]
-    shift, *_ = linalg.lstsq(subspace[:-1], subspace[1:], check_finite=False)
+    rank = min(most, int(np.count_nonzero(sizes > RANK_TOLERANCE * sizes[0])), half - 1)
+    subspace: Floats = vectors[:, order[:rank]]
+    return subspace
+
+
+def rates_of_subspace(subspace: Floats, terms: int, step: float) -> Complexes:
+    """Return the rates [1/s] of the first vectors of a signal's subspace, slowest first."""
+    vectors = subspace[:, :terms]
+    shift, *_ = linalg.lstsq(vectors[:-1], vectors[1:], check_finite=False)
     multipliers = np.asarray(linalg.eigvals(shift), dtype=np.complex128)
     # A negative real multiplier changes sign with each sample: no function of time does that.
     usable = (multipliers.imag > 0.0) | ((multipliers.imag == 0.0) & (multipliers.real > 0.0))
-    rates: Complexes = np.log(multipliers[usable]) / dt
+    rates: Complexes = np.log(multipliers[usable]) / step
     return rates[np.argsort(-rates.real, kind="stable")]
 
 
@@ -122,6 +140,21 @@ def esprit_choices(
     if not choices:
         raise SolverError(f"ESPRIT found no usable rate with {terms} term(s) in this response")
     return sorted(choices, key=lambda choice: choice.error)
+
+
+def continued_rates(response: Target, terms: int, end: float) -> Complexes:
+    """Return ESPRIT's rates of a response that dies away soon after `end`, whatever it is there.
+
+    Raises:
+        SolverError: They are not usable.
+    """
+    times = np.linspace(0.0, CONTINUED_TO * end, max(SAMPLES, 8 * terms))
+    after = np.maximum(times - end, 0.0) / end
+    values = response(np.minimum(times, end)) * np.exp(-CONTINUED_DECAYS * after)
+    rates = take(damped(esprit(values, float(times[1]), terms), end), terms)
+    if not len(rates):
+        raise SolverError(f"ESPRIT found no usable rate with {terms} term(s)")
+    return rates
 
 
 def damped(rates: Complexes, end: float) -> Complexes:

@@ -1,34 +1,49 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One call from a response to a decay model: choose rates by a method, then fit coefficients."""
+"""From a response to a sum of exponentials in one call, by any of the methods.
+
+The sum is held to what is assumed of the response after the interval (`tail`), whatever the
+method and the norm. Records whose noise is more than a fit of the largest error could stand are
+fitted by least squares with free rates (`free_rates`).
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from limit_surface_ros.checks import as_positive
 from limit_surface_ros.decay.basis import as_rates
 from limit_surface_ros.decay.coefficients import ResponseFit, fit_response
 from limit_surface_ros.decay.delay.rates import dde_rates
-from limit_surface_ros.decay.esprit import esprit_choices, esprit_rates
+from limit_surface_ros.decay.esprit import continued_rates, esprit_choices, esprit_rates
+from limit_surface_ros.decay.least_squares import least_squares_fit, require_samples
 from limit_surface_ros.decay.neutral import neutral_rates
-from limit_surface_ros.decay.noise import is_noisy
+from limit_surface_ros.decay.noise import is_noisy, noise_level
 from limit_surface_ros.decay.polish import polished_rates
 from limit_surface_ros.decay.rates import RateChoice
+from limit_surface_ros.decay.tail import Tail, envelope_of, tail_of
+from limit_surface_ros.decay.targets import PiecewiseLinear
 from limit_surface_ros.errors import LimitSurfaceError, RangeError, SolverError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from limit_surface_ros.checks import Floats
     from limit_surface_ros.decay.coefficients import Criterion
+    from limit_surface_ros.decay.free_rates import Tried
     from limit_surface_ros.decay.targets import Target
 
-METHODS = ("dde", "neutral", "esprit", "polished", "best")
+METHODS = ("dde", "neutral", "esprit", "polished", "least_squares", "best")
+AUTO = "auto"
 Progress = Callable[[str], None]
 # Starts with more than this times the error of the best are not worth polishing.
 MOST_BEHIND = 2.0
+# Without noise `auto` takes the fewest terms whose error is below this part of the onset.
+AUTO_ERROR, MOST_AUTO = 1e-3, 15
 
 
 @dataclass(frozen=True)
@@ -39,22 +54,34 @@ class DecayFit:
         choice: The rates, their method and what the method chose.
         fit: The coefficients and their errors.
         seconds: Time it took [s].
+        tail: What is assumed after the interval, and what the sum does there; None if it was left
+            free or does not decay.
+        noise: Standard deviation of the record's noise, in the unit of x; 0 if it has none.
+        outliers: Shape (k,), times [s] of the samples that were taken as outliers.
+        terms_tried: The numbers of terms that were compared, if there were several.
     """
 
     choice: RateChoice
     fit: ResponseFit
     seconds: float
+    tail: Tail | None = None
+    noise: float = 0.0
+    outliers: Floats = field(default_factory=lambda: np.zeros(0))
+    terms_tried: tuple[Tried, ...] = ()
 
 
 @dataclass(frozen=True)
 class Options:
-    """Choices that only some methods look at.
+    """Choices beside terms, method and norm, most of which only some methods look at.
 
     Attributes:
         max_delay: Maximum delay of the delay system [s]; found by trial fits if None.
         degree: Degree of the kernel's polynomial pieces; a default of the construction if None.
         allow_unstable: Go on with responses that are not minimum-phase (method dde).
         tail_rates: Known complex rates of the response's tail (method neutral), or None.
+        robust: Look for outliers (method least_squares).
+        offset: Fit a constant to which the response decays (method least_squares).
+        bounded: Hold the sum after the interval to what is assumed of the response there.
 
     Raises:
         RangeError: A tail rate does not decay, or is not the one of its pair with Im >= 0.
@@ -64,6 +91,9 @@ class Options:
     degree: int | None = None
     allow_unstable: bool = False
     tail_rates: ArrayLike | None = None
+    robust: bool = True
+    offset: bool = False
+    bounded: bool = True
 
     def __post_init__(self) -> None:
         """Check the tail rates, which some methods look at late or never."""
@@ -79,10 +109,10 @@ class Options:
 
 def fit_decay(
     response: Target,
-    terms: int,
+    terms: int | str,
     end: float,
     method: str = "best",
-    norm: str | Criterion = "inf",
+    norm: str | Criterion = AUTO,
     options: Options | None = None,
     progress: Progress | None = None,
 ) -> DecayFit:
@@ -90,15 +120,19 @@ def fit_decay(
 
     Args:
         response: The response.
-        terms: Number of real terms, a conjugate pair counting two; the fit may have fewer.
+        terms: Number of real terms, a conjugate pair counting two; the fit may have fewer. A
+            constant (`Options.offset`) is beside them. "auto": as many as the record holds by
+            BIC if it is noisy, else the fewest with an error below a thousandth of the onset.
         end: End of the interval [s].
         method: How rates are chosen: "dde" (characteristic roots of the response's own delay
             system, the thesis), "neutral" (closed-form roots), "esprit" (from samples),
             "polished" (ESPRIT's rates, then moved to reduce the error unless the record is noisy),
-            or "best" (the better of neutral and polished).
-        norm: In which norm the coefficients are fitted, see `coefficient_fits`. Rates are always
-            chosen by the infinity norm.
-        options: Choices for single methods.
+            "least_squares" (free rates, of samples alone), or "best": least_squares if the record
+            is noisy or an offset is asked for, else the better of neutral and polished.
+        norm: In which norm the coefficients are fitted, see `fit_coefficients`; "auto": the
+            2-norm after least_squares, else the infinity norm. Rates are chosen by the 2-norm in
+            least_squares and else by the infinity norm.
+        options: Further choices.
         progress: Called with a line of text when there is something to tell.
 
     Raises:
@@ -106,18 +140,133 @@ def fit_decay(
         UnstableError: The method is dde and the response's delay system would be unstable.
         DataError: The response cannot support the method.
         SolverError: A result could not be certified.
+
+    Example:
+        >>> from limit_surface_ros.decay.examples import exponential
+        >>> fit = fit_decay(exponential(), "auto", 6.0)
+        >>> fit.fit.sum.terms, round(fit.tail.envelope, 4)
+        (1, 0.0045)
     """
     span = as_positive("end", end)
-    if terms < 1:
-        raise RangeError(f"terms must be at least 1, got {terms}")
+    if terms != AUTO and (isinstance(terms, str) or terms < 1):
+        raise RangeError(f"terms must be at least 1, or {AUTO!r}, got {terms!r}")
     if method not in METHODS:
         raise RangeError(f"method must be one of {', '.join(METHODS)}; got {method!r}")
     chosen = options or Options()
     tell = progress or (lambda line: None)
     start = time.perf_counter()
-    choice = _choose(response, terms, span, method, chosen, tell)
-    fit = fit_response(choice.rates, response, span, norm)
-    return DecayFit(choice, fit, time.perf_counter() - start)
+    noise = noise_level(response)
+    by_samples = method == "least_squares" or (
+        method == "best" and (chosen.offset or is_noisy(response))
+    )
+    if by_samples:
+        found = least_squares_fit(
+            require_samples(response),
+            None if isinstance(terms, str) else terms,
+            span,
+            norm,
+            noise,
+            robust=chosen.robust,
+            offset=chosen.offset,
+            tell=tell,
+        )
+        return DecayFit(
+            found.choice,
+            found.fit,
+            time.perf_counter() - start,
+            tail_of(found.fit.sum, span, found.envelope),
+            noise,
+            found.outliers,
+            found.terms_tried,
+        )
+    if chosen.offset:
+        raise RangeError("an offset is fitted by the methods least_squares and best alone")
+    envelope = envelope_of(response, span, noise) if chosen.bounded else None
+    used = "inf" if norm == AUTO else norm
+    if isinstance(terms, str):
+        choice, fit = _fewest(response, span, method, used, chosen, envelope, tell)
+    else:
+        choice, fit = _fitted(response, terms, span, method, used, chosen, envelope, tell)
+    tail = None
+    if envelope is not None and fit.sum.settles:
+        tail = tail_of(fit.sum, span, envelope)
+    return DecayFit(choice, fit, time.perf_counter() - start, tail, noise)
+
+
+def _fewest(
+    response: Target,
+    end: float,
+    method: str,
+    norm: str | Criterion,
+    options: Options,
+    envelope: float | None,
+    tell: Progress,
+) -> tuple[RateChoice, ResponseFit]:
+    """Fit with more and more terms until the error is small; keep the last if it never is."""
+    failure: LimitSurfaceError | None = None
+    best: tuple[RateChoice, ResponseFit] | None = None
+    for terms in range(1, MOST_AUTO + 1):
+        if isinstance(response, PiecewiseLinear) and len(response.knots) < 2 * terms:
+            break
+        try:
+            found = _fitted(response, terms, end, method, norm, options, envelope, tell)
+        except LimitSurfaceError as error:
+            failure = error
+            continue
+        if best is None or found[1].max_error < best[1].max_error:
+            best = found
+        if found[1].max_error <= AUTO_ERROR * abs(float(response(0.0))):
+            break
+    if best is None:
+        raise failure or SolverError("the response has too few samples for one term")
+    return best
+
+
+def _fitted(
+    response: Target,
+    terms: int,
+    end: float,
+    method: str,
+    norm: str | Criterion,
+    options: Options,
+    envelope: float | None,
+    tell: Progress,
+) -> tuple[RateChoice, ResponseFit]:
+    choice = _choose(response, terms, end, method, options, tell)
+    free = fit_response(choice.rates, response, end, norm)
+    if envelope is None:
+        return choice, free
+    fit = fit_response(choice.rates, response, end, norm, envelope)
+    held = fit.sum is not free.sum and not np.array_equal(fit.sum.weights, free.sum.weights)
+    if held and method in ("polished", "best"):
+        # On rates that were chosen without a thought of what comes after, holding costs much.
+        choice = _polished_within(response, terms, end, choice, envelope, tell)
+        fit = fit_response(choice.rates, response, end, norm, envelope)
+    return choice, fit
+
+
+def _polished_within(
+    response: Target, terms: int, end: float, choice: RateChoice, envelope: float, tell: Progress
+) -> RateChoice:
+    """Polish rates with the sum held after the end, from those of two starts."""
+    starts = [choice.rates]
+    try:
+        starts.append(continued_rates(response, terms, end))
+    except SolverError as error:
+        tell(f"continued record: {error}")
+    choices = []
+    for rates in starts:
+        try:
+            reached = fit_response(rates, response, end, envelope=envelope).max_error
+            start = RateChoice(rates, choice.method, reached, None, choice.parameters)
+            choices.append(polished_rates(response, end, start, envelope=envelope))
+        except SolverError as failure:
+            tell(f"held after the end: {failure}")
+            continue
+        tell(f"held after the end: error {choices[-1].error:.4g}")
+    if not choices:
+        raise SolverError("the sum could not be held after the end")
+    return min(choices, key=lambda choice: choice.error)
 
 
 def _choose(

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.decay.targets import PiecewiseLinear, Record
+from limit_surface_ros.sample_noise import estimate_noise
 
 if TYPE_CHECKING:
     from limit_surface_ros.decay.targets import Target
@@ -29,18 +30,12 @@ SAME_LEVEL, LEAST_LEVEL = 0.01, 0.01
 def noise_level(response: Target) -> float:
     """Return the standard deviation of a record's noise, in the unit of x; 0 if it has none.
 
-    Taken from the median distance of a sample from the line through its neighbours, in which a
-    smooth or piecewise linear response leaves next to nothing.
+    A smooth or piecewise linear response leaves next to nothing in the divided differences from
+    which it is taken, see `estimate_noise`.
     """
     if not isinstance(response, PiecewiseLinear) or len(response.knots) < LEAST_SAMPLES:
         return 0.0
-    times, values = response.knots, response.values
-    share = (times[1:-1] - times[:-2]) / (times[2:] - times[:-2])
-    distances = values[1:-1] - (1.0 - share) * values[:-2] - share * values[2:]
-    # For independent noise of deviation 1 each distance has the deviation below, and 1.4826
-    # turns the median of absolute values into a deviation.
-    deviations = np.sqrt(1.0 + share**2 + (1.0 - share) ** 2)
-    return float(1.4826 * np.median(np.abs(distances / deviations)))
+    return estimate_noise(response.knots, response.values)
 
 
 def is_noisy(response: Target) -> bool:

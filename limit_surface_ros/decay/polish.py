@@ -20,6 +20,7 @@ from limit_surface_ros.decay.exponential_sum import ExponentialSum
 from limit_surface_ros.decay.grids import fit_times
 from limit_surface_ros.decay.minimax import solve_minimax
 from limit_surface_ros.decay.rates import RateChoice, judged
+from limit_surface_ros.decay.tail import tail_times, tail_weight
 from limit_surface_ros.errors import SolverError
 
 if TYPE_CHECKING:
@@ -63,6 +64,7 @@ def polished_rates(
     end: float,
     start: RateChoice,
     progress: Callable[[int, float], None] | None = None,
+    envelope: float | None = None,
 ) -> RateChoice:
     """Return rates near those of another choice with a smaller largest error on [0, end].
 
@@ -71,11 +73,13 @@ def polished_rates(
         end: End of the interval [s].
         start: Rates to start from; the result is never worse.
         progress: Called after each step with its number and the error so far.
+        envelope: After the end the sum is held to this, or to its error if that is larger; it is
+            free there if None.
 
     Raises:
         SolverError: Not even the start could be fitted.
     """
-    problem = _Problem(response, end, start.rates)
+    problem = _Problem(response, end, start.rates, envelope)
     point = problem.fitted(start.rates)
     radius, stalled, steps = FIRST_RADIUS, 0, 0
     while steps < MOST_STEPS and radius > LEAST_RADIUS and stalled < STALL:
@@ -99,7 +103,7 @@ def polished_rates(
         if progress is not None:
             progress(steps, point.error)
     parameters = {**start.parameters, "start": start.method, "steps": steps}
-    choice = judged(point.rates, response, end, "polished", None, parameters)
+    choice = judged(point.rates, response, end, "polished", None, parameters, envelope)
     if choice.error < start.error:
         return choice
     return RateChoice(start.rates, "polished", start.error, start.system, parameters)
@@ -111,11 +115,21 @@ class _Problem:
     `seen` are those that the present step fits, to which its refits add the worst.
     """
 
-    def __init__(self, response: Target, end: float, rates: Complexes) -> None:
+    def __init__(
+        self, response: Target, end: float, rates: Complexes, envelope: float | None
+    ) -> None:
         fastest = float(np.abs(rates.imag).max())
         self.times = fit_times(response, end, fastest)
         self.target = response(self.times)
         self.scale = float(np.abs(self.target).max())
+        self.envelope, self.within = envelope, len(self.times)
+        # Rows after the end are weighed so that the envelope there counts as the error before.
+        self.weights = np.ones(self.within)
+        if envelope is not None:
+            tail = tail_times(rates, end)
+            self.times = np.append(self.times, tail)
+            self.target = np.append(self.target, np.zeros(len(tail)))
+            self.weights = np.ones(len(self.times))
         self.least_decay = LEAST_DECAYS / end
         self.base = np.zeros(len(self.times), dtype=bool)
         self.base[:: max(1, len(self.times) // max(300, 6 * count_terms(rates)))] = True
@@ -125,12 +139,18 @@ class _Problem:
         """Return the rates with minimax coefficients, refitted until the fine grid agrees."""
         basis = real_basis(rates, self.times)
         for _ in range(ROUNDS):
-            solution = solve_minimax(basis[self.seen], self.target[self.seen])
+            weights = self.weights[self.seen]
+            rows = basis[self.seen] * weights[:, np.newaxis]
+            solution = solve_minimax(rows, self.target[self.seen] * weights)
             errors = np.abs(basis @ solution.weights - self.target)
+            before = float(errors[: self.within].max())
+            errors *= self.weights
             worst = float(errors.max())
             if worst <= (1.0 + AGREEMENT) * solution.value:
                 break
             self.seen |= _peaks(errors) & (errors > PEAK_OF_REFIT * solution.value)
+        if self.envelope is not None:
+            self.weights[self.within :] = tail_weight(before, self.envelope)
         return _Point(rates, solution.weights, worst)
 
     def step(self, point: _Point, radius: float) -> tuple[_Point, float]:
@@ -141,7 +161,7 @@ class _Problem:
             radius: How far a rate may move, in parts of its mobility.
         """
         x = ExponentialSum.from_weights(point.rates, point.weights)
-        errors = self.target - x(self.times)
+        errors = (self.target - x(self.times)) * self.weights
         peaks = _peaks(np.abs(errors)) & (np.abs(errors) > PEAK_OF_STEP * point.error)
         seen = self.base | peaks | np.roll(peaks, 2) | np.roll(peaks, -2)
         self.seen = seen
@@ -152,6 +172,8 @@ class _Problem:
         waves = np.exp(np.multiply.outer(times, point.rates)) * times[:, np.newaxis] * coefficients
         is_pair = point.rates.imag != 0.0
         tangents = np.concatenate([waves.real, -waves.imag[:, is_pair]], axis=1)
+        tangents *= self.weights[seen, np.newaxis]
+        basis *= self.weights[seen, np.newaxis]
         reach = radius * np.concatenate([_mobility(point.rates), _mobility(point.rates[is_pair])])
         # In units of its reach each change of a rate is a row that weighs as much as the error.
         terms, moves = basis.shape[1], tangents.shape[1]

@@ -47,10 +47,11 @@ def judged(
     method: str,
     system: DelaySystem | None = None,
     parameters: Mapping[str, float | int | str] | None = None,
+    envelope: float | None = None,
 ) -> RateChoice:
-    """Return the rates with the error that they reach on [0, end]."""
+    """Return the rates with the error that they reach on [0, end], see `fit_response`."""
     checked = as_rates(rates)
-    error = fit_response(checked, response, end).max_error
+    error = fit_response(checked, response, end, envelope=envelope).max_error
     return RateChoice(checked, method, error, system, parameters or {})
 
 
