@@ -23,11 +23,12 @@ from limit_surface_ros.decay.esprit import continued_rates, esprit_choices, espr
 from limit_surface_ros.decay.least_squares import least_squares_fit, require_samples
 from limit_surface_ros.decay.neutral import neutral_rates
 from limit_surface_ros.decay.noise import is_noisy, noise_level
+from limit_surface_ros.decay.outliers import running_median
 from limit_surface_ros.decay.polish import polished_rates
 from limit_surface_ros.decay.rates import RateChoice
 from limit_surface_ros.decay.tail import Tail, envelope_of, tail_of
 from limit_surface_ros.decay.targets import PiecewiseLinear
-from limit_surface_ros.errors import LimitSurfaceError, RangeError, SolverError
+from limit_surface_ros.errors import DataError, LimitSurfaceError, RangeError, SolverError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -42,6 +43,8 @@ AUTO = "auto"
 Progress = Callable[[str], None]
 # Starts with more than this times the error of the best are not worth polishing.
 MOST_BEHIND = 2.0
+# A response grows that is largest at its end, so many times as large as at its onset.
+GROWN, GROWTH_POINTS = 1.2, 501
 # Without noise `auto` takes the fewest terms whose error is below this part of the onset.
 AUTO_ERROR, MOST_AUTO = 1e-3, 15
 
@@ -138,7 +141,7 @@ def fit_decay(
     Raises:
         RangeError: A number or a name is out of range.
         UnstableError: The method is dde and the response's delay system would be unstable.
-        DataError: The response cannot support the method.
+        DataError: The response grows, or cannot support the method.
         SolverError: A result could not be certified.
 
     Example:
@@ -153,6 +156,8 @@ def fit_decay(
     if method not in METHODS:
         raise RangeError(f"method must be one of {', '.join(METHODS)}; got {method!r}")
     chosen = options or Options()
+    if not (chosen.offset or chosen.allow_unstable):
+        refuse_growth(response, span)
     tell = progress or (lambda line: None)
     start = time.perf_counter()
     noise = noise_level(response)
@@ -191,6 +196,26 @@ def fit_decay(
     if envelope is not None and fit.sum.settles:
         tail = tail_of(fit.sum, span, envelope)
     return DecayFit(choice, fit, time.perf_counter() - start, tail, noise)
+
+
+def refuse_growth(response: Target, end: float) -> None:
+    """Refuse a response that is largest at the end of the interval, and larger than its onset.
+
+    Raises:
+        DataError: It grows.
+    """
+    times = np.linspace(0.0, end, GROWTH_POINTS)
+    sizes = running_median(np.abs(response(times)))
+    last = len(times) // 10
+    onset = max(float(sizes[0]), abs(float(response(0.0))))
+    highest = float(sizes[-last:].max())
+    if highest > GROWN * onset and highest > float(sizes[:-last].max()):
+        raise DataError(
+            f"the response grows: it starts at {float(response(0.0)):.4g} and is largest, "
+            f"{highest:.4g}, at the end of [0, {end:g}] s. A decay model dies away: does the "
+            "record run backwards, or begin before its onset? If it rises to a plateau, fit the "
+            "constant (an offset that is free)"
+        )
 
 
 def _fewest(

@@ -45,6 +45,8 @@ ESPRIT_SAMPLES = 801
 FIRST_STEPS, LAST_STEPS, ROBUST_STEPS = 6, 40, 12
 KEPT_STARTS = 3
 ROBUST_ROUNDS = 3
+# Residuals that exceed the noise by less than this factor are noise.
+MORE_MISFIT = 1.3
 # Numbers that a real rate, a pair and a constant count in BIC.
 REAL_PENALTY, PAIR_PENALTY, OFFSET_PENALTY = 2, 6, 1
 MOST_AUTOMATIC = 15
@@ -124,14 +126,16 @@ def free_rates(
     if not path or (terms is not None and len(path) < terms):
         raise SolverError(f"no fit with {terms} terms was found in these samples")
     fit = path[-1 if terms is not None else best]
-    if robust:
-        for _ in range(ROBUST_ROUNDS):
-            found = samples.weights * np.sqrt(neighbour_weights(fit.residuals, samples.noise))
-            if (found == weights).all():
-                break
-            weights = found
-            problem = VariableProjection(replace(samples, weights=weights))
-            fit = problem.result(problem.improve(problem.project(fit.rates), ROBUST_STEPS))
+    misfit = 1.0
+    for _ in range(ROBUST_ROUNDS):
+        before = (weights, misfit)
+        if robust:
+            weights = samples.weights * np.sqrt(neighbour_weights(fit.residuals, samples.noise))
+        misfit = max(1.0, _judge(fit, replace(samples, weights=weights)).deviation / samples.noise)
+        if (weights == before[0]).all() and misfit <= MORE_MISFIT * before[1]:
+            break
+        problem = VariableProjection(replace(samples, weights=weights, misfit=misfit))
+        fit = problem.result(problem.improve(problem.project(fit.rates), ROBUST_STEPS))
     return FreeRates(fit, weights == 0.0, weights, tuple(tried))
 
 

@@ -57,6 +57,8 @@ class Samples:
         noise: Standard deviation of a sample of weight 1, above 0.
         envelope: What |x|, less its constant, never exceeds after the last time; above 0.
         offset: Whether a constant is fitted beside the exponentials.
+        misfit: By how much the residuals exceed the noise, at least 1: what comes after the last
+            time is weighed against them.
     """
 
     times: Floats
@@ -65,6 +67,7 @@ class Samples:
     noise: float
     envelope: float
     offset: bool = False
+    misfit: float = 1.0
 
     @property
     def end(self) -> float:
@@ -105,7 +108,8 @@ class VariableProjection:
         self._row_weights = samples.weights / samples.noise
         self._target = samples.values * self._row_weights
         self._tail = TAIL_TIMES * samples.end
-        self._tail_weight = TAIL_WEIGHT / samples.envelope
+        self._allowed = TAIL_WEIGHT * samples.misfit
+        self._tail_weight = self._allowed / samples.envelope
         self._ridge = 1.0 / (LARGE_COEFFICIENT * float(np.abs(samples.values).max()))
         steps = np.diff(samples.times)
         self._decays = LEAST_DECAYS / samples.end, MOST_DECAYS / float(steps.min())
@@ -138,7 +142,7 @@ class VariableProjection:
         inner = basis[count : count + len(tail)]
         for _ in range(3):
             ends = inner @ (basis.T @ target)
-            target[count : count + len(tail)] = np.clip(ends, -TAIL_WEIGHT, TAIL_WEIGHT)
+            target[count : count + len(tail)] = np.clip(ends, -self._allowed, self._allowed)
         projected = basis.T @ target
         solution = np.zeros(columns)
         solution[order[:rank]] = linalg.solve_triangular(triangle[:rank, :rank], projected)

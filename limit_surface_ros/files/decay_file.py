@@ -15,6 +15,11 @@ A file is YAML::
     time_span: [0.0, 6.0]              # [s], where the error was measured
     norm: inf
     max_error: 0.0282                  # in the unit of x
+    noise: 0.004                       # optional: standard deviation of the record's noise
+    tail:                              # optional: after the time span
+      envelope: 0.02                   # |response - constant| is assumed never to exceed this
+      bound: 0.031                     # |x - constant| provably never does
+      assumption: after 6 s ...        # the assumption in words
     rates: [[-2.05, 0.51], ...]        # [re, im] [1/s], one of each conjugate pair (im >= 0)
                                        # the rate [0, 0] is a constant, to which x decays
     coefficients: [[0.31, -0.2], ...]  # x(t) = Re sum c exp(lambda t)
@@ -22,21 +27,26 @@ A file is YAML::
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from limit_surface_ros.checks import as_floats
 from limit_surface_ros.decay.delay.pieces import PiecewisePolynomial
 from limit_surface_ros.decay.delay.system import DelaySystem
 from limit_surface_ros.decay.exponential_sum import ExponentialSum
+from limit_surface_ros.decay.tail import Tail
 from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.section import Section, place_errors
 from limit_surface_ros.files.yaml_reader import read_yaml, write_yaml
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
 
@@ -56,6 +66,9 @@ class DecayModel:
         max_error: Largest |x - response| on the time span, in the unit of x.
         system: The delay system whose roots the rates are, if they come from one.
         fit: How the model came about, as plain values for the file.
+        tail: What is assumed of the response after the time span, and what the sum does there;
+            None if nothing was stated.
+        noise: Standard deviation of the noise of the record that was fitted; 0 if not stated.
 
     Raises:
         RangeError: The name is empty, the span is not 0 <= start < end, the error is negative, or
@@ -69,6 +82,8 @@ class DecayModel:
     max_error: float
     system: DelaySystem | None = None
     fit: Mapping[str, Any] = field(default_factory=dict)
+    tail: Tail | None = None
+    noise: float = 0.0
 
     def __post_init__(self) -> None:
         """Check what the sum itself has not checked."""
@@ -84,8 +99,33 @@ class DecayModel:
                 f"a decay model must decay: its right-most rate has the real part "
                 f"{self.sum.slowest_rate:g}, which must be below 0 (the rate 0 is a constant)"
             )
+        if not 0.0 <= self.noise < float("inf"):
+            raise RangeError(f"noise must be finite and at least 0, got {self.noise}")
         object.__setattr__(self, "time_span", (start, end))
+        object.__setattr__(self, "noise", float(self.noise))
         object.__setattr__(self, "max_error", float(self.max_error))
+
+    def bounds(self, times: ArrayLike) -> Floats:
+        """Return what |x - response| does not exceed at given times, as the file states it.
+
+        On the time span the error that was measured there; after it, what the sum and the
+        response may differ by if the response does as the tail assumes. NaN where the file
+        states nothing: before the span, and after it without a tail.
+
+        Args:
+            times: Any shape [s].
+
+        Raises:
+            NotFiniteError: A time is NaN or infinite.
+        """
+        t = as_floats("times", times)
+        start, end = self.time_span
+        after = self.tail.error if self.tail is not None else float("nan")
+        after = max(after, self.max_error) if self.tail is not None else after
+        bounds: Floats = np.where(
+            t < start, float("nan"), np.where(t <= end, self.max_error, after)
+        )
+        return bounds
 
 
 def read_decay_model(path: str | Path) -> DecayModel:
@@ -104,6 +144,8 @@ def read_decay_model(path: str | Path) -> DecayModel:
     span = top.array("time_span", (2,))
     norm = top.text("norm")
     max_error = top.number("max_error", at_least=0.0)
+    noise = top.number("noise", at_least=0.0) if "noise" in top else 0.0
+    tail = _read_tail(top.section("tail")) if "tail" in top else None
     system = _read_system(top.section("system")) if "system" in top else top.raw("system", None)
     fit = dict(top.section("fit").values) if "fit" in top else top.raw("fit", None) or {}
     top.finish()
@@ -111,7 +153,7 @@ def read_decay_model(path: str | Path) -> DecayModel:
     model: DecayModel = place_errors(
         top,
         "time_span" if x.settles else "rates",
-        lambda: DecayModel(name, x, (span[0], span[1]), norm, max_error, system, fit),
+        lambda: DecayModel(name, x, (span[0], span[1]), norm, max_error, system, fit, tail, noise),
     )
     return model
 
@@ -132,6 +174,10 @@ def write_decay_model(model: DecayModel, path: str | Path, header: str = "") -> 
         values["fit"] = dict(model.fit)
     if model.system is not None:
         values["system"] = _system_values(model.system)
+    if model.noise:
+        values["noise"] = model.noise
+    if model.tail is not None:
+        values["tail"] = dataclasses.asdict(model.tail)
     # Last, and as long as each other: a file that was cut short anywhere is refused.
     values |= {
         "time_span": list(model.time_span),
@@ -183,6 +229,14 @@ def _read_system(section: Section) -> DelaySystem:
         section, "delays", lambda: DelaySystem(delays, strengths, pieces)
     )
     return system
+
+
+def _read_tail(section: Section) -> Tail:
+    envelope = section.number("envelope", at_least=0.0)
+    bound = section.number("bound", at_least=0.0)
+    assumption = section.text("assumption")
+    section.finish()
+    return Tail(envelope, bound, assumption)
 
 
 def _system_values(system: DelaySystem) -> dict[str, Any]:

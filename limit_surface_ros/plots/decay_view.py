@@ -53,9 +53,16 @@ def _draw_fit(axes: Axes, model: DecayModel, target: Target | None, times: Float
     if isinstance(target, Record):
         samples = _samples(target, times[-1])
         axes.plot(samples, target(samples), ".", color=SKY, markersize=8, label="samples")
+        outliers = _outliers(model, samples)
+        if len(outliers):
+            axes.plot(outliers, target(outliers), "x", color=BLACK, label="taken as outliers")
     elif target is not None:
         axes.plot(times, target(times), color=SKY, linewidth=4, label="response")
     axes.plot(times, model.sum(times), color=VERMILION, label="model")
+    if model.sum.constant:
+        axes.axhline(
+            model.sum.constant, color=VERMILION, linewidth=0.8, linestyle="--", label="constant"
+        )
     axes.set(title="response and model", xlabel="t [s]", ylabel="x", xlim=(0.0, times[-1]))
     axes.legend()
 
@@ -63,7 +70,10 @@ def _draw_fit(axes: Axes, model: DecayModel, target: Target | None, times: Float
 def _draw_error(axes: Axes, model: DecayModel, target: Target | None, times: Floats) -> None:
     if target is not None:
         # Of a record nothing is known between its samples.
-        known = _samples(target, times[-1]) if isinstance(target, Record) else times
+        known = times
+        if isinstance(target, Record):
+            samples = _samples(target, times[-1])
+            known = samples[~np.isin(samples, _outliers(model, samples))]
         style = ".-" if isinstance(target, Record) else "-"
         error = model.sum(known) - target(known)
         axes.plot(known, error, style, color=BLUE, linewidth=1, markersize=4, label="error")
@@ -83,6 +93,15 @@ def _draw_error(axes: Axes, model: DecayModel, target: Target | None, times: Flo
     axes.legend(loc="upper right", ncols=2)
 
 
+def _outliers(model: DecayModel, samples: Floats) -> Floats:
+    """Return the samples' times that the model file names as outliers."""
+    named = np.atleast_1d(np.asarray(model.fit.get("outlier_times", []), dtype=np.float64))
+    nearest = np.abs(np.subtract.outer(named, samples)) if len(named) else np.zeros((0, 1))
+    # Times from a file may have gone through text.
+    outliers: Floats = samples[np.unique(nearest.argmin(axis=1))] if len(named) else named
+    return outliers
+
+
 def _samples(record: Record, end: float) -> Floats:
     times: Floats = record.knots[record.knots <= end]
     return times
@@ -92,11 +111,24 @@ def _draw_rates(axes: Axes, model: DecayModel) -> None:
     rates = model.sum.rates
     sizes = 12.0 + 60.0 * np.abs(model.sum.coefficients) / np.abs(model.sum.coefficients).max()
     pairs = rates.imag > 0.0
-    for sign in (1.0, -1.0):
+    for sign in (1.0, -1.0) if pairs.any() else ():
         axes.scatter(
-            rates.real[pairs], sign * rates.imag[pairs], s=sizes[pairs], color=BLUE, alpha=0.8
+            rates.real[pairs],
+            sign * rates.imag[pairs],
+            s=sizes[pairs],
+            color=BLUE,
+            alpha=0.8,
+            label="pair of rates" if sign > 0.0 else None,
         )
-    axes.scatter(rates.real[~pairs], rates.imag[~pairs], s=sizes[~pairs], color=VERMILION)
+    if not pairs.all():
+        axes.scatter(
+            rates.real[~pairs],
+            rates.imag[~pairs],
+            s=sizes[~pairs],
+            color=VERMILION,
+            label="real rate",
+        )
+    axes.legend()
     axes.axvline(0.0, color=BLACK, linewidth=0.8)
     axes.axhline(0.0, color=BLACK, linewidth=0.5)
     axes.set(title="rates (larger: larger coefficient)", xlabel="Re λ [1/s]", ylabel="Im λ [1/s]")
@@ -119,8 +151,17 @@ def _draw_projection(axes: Axes, model: DecayModel, target: Target | None) -> No
         label="|model|",
     )
     axes.axvline(end, color=BLACK, linewidth=0.8, linestyle=":", label="end of the fit")
+    if model.tail is not None:
+        constant = abs(model.sum.constant)
+        later = [end, times[-1]]
+        for height, style, label in (
+            (model.tail.bound, "-", "proven bound of the model"),
+            (model.tail.envelope, "--", "assumed of the response"),
+        ):
+            level = max(constant + height, floor)
+            axes.plot(later, [level, level], color=BLUE, linewidth=1, linestyle=style, label=label)
     axes.set(title="projection", xlabel="t [s]", ylabel="|x|", xlim=(0.0, times[-1]))
-    axes.legend(loc="upper right")
+    axes.legend(loc="upper right", fontsize="small")
 
 
 def _known_until(target: Target, end: float) -> float:

@@ -87,7 +87,7 @@ def run(options: argparse.Namespace) -> None:
                 refusals[method] = str(error)
                 rows.append([method, str(terms), "refused", "", "", ""])
             progress(done, len(pairs))
-    print(f"{given.source}, fitted on [0, {given.end:g}] s, infinity norm")
+    print(f"{given.source}, fitted on [0, {given.end:g}] s, largest errors")
     for note in given.notes:
         print(note)
     for row in (HEADINGS, ["---"] * len(HEADINGS), *rows):

@@ -104,7 +104,7 @@ def add_input_options(parser: argparse.ArgumentParser) -> None:
         "--offset",
         metavar="X",
         help="what to take away from a record's values, such as a sensor's bias; `auto`: the "
-        "constant at which the record ends",
+        "constant at which the record ends; `free`: fit the constant to which it decays",
     )
     add_response_options(parser)
     parser.add_argument("--topic", metavar="NAME", help="of a bag")
@@ -198,7 +198,7 @@ def of_record(
         whole: The record.
         end: Of the interval [s], counted from `start`; the end of the record if not given.
         start: The onset within the record [s].
-        offset: A number to take away from the values, or "auto".
+        offset: A number to take away from the values, or "auto"; "free" takes nothing away.
 
     Raises:
         FileError: The start or the end lies beyond the record.
@@ -210,13 +210,15 @@ def of_record(
     if end is not None and end > last:
         raise FileError(f"{source}: the record ends at {last:g} s, before --end {end:g}")
     span = end or last
-    if offset is None:
+    # A constant that is fitted is no part of the input.
+    if offset is None or offset == "free":
         return DecayInput(source, record, span, last, start)
     if offset == "auto":
         level = resting_level(record, span)
         if level is None:
             raise DataError(
-                f"{source}: ends at no constant other than 0; give --offset a number, or leave it"
+                f"{source}: ends at no constant other than 0; give --offset a number, "
+                "fit the constant with --offset free, or leave it"
             )
     else:
         level = _number("--offset", offset)

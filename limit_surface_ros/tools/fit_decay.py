@@ -18,12 +18,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from limit_surface_ros import __version__
+from limit_surface_ros.checks import counted
 from limit_surface_ros.decay.coefficients import NORMS
 from limit_surface_ros.decay.examples import EXAMPLES as RESPONSES
-from limit_surface_ros.decay.fit import METHODS, Options, fit_decay
+from limit_surface_ros.decay.fit import AUTO, METHODS, Options, fit_decay
 from limit_surface_ros.decay.grids import largest_error
 from limit_surface_ros.decay.noise import resting_level
-from limit_surface_ros.decay.targets import Record
+from limit_surface_ros.decay.targets import PiecewiseLinear, Record
+from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.decay_file import DecayModel, write_decay_model
 from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
 from limit_surface_ros.tools.csv_options import OF_RESPONSES
@@ -46,7 +48,15 @@ EXAMPLES = """methods:
   neutral   roots of x(t) = eps x(t - L), in closed form, beside --tail-rate if given
   esprit    rates of the samples by ESPRIT, coefficients refitted
   polished  those of esprit, moved to make the largest error smaller
-  best      the better of neutral and polished
+  least_squares
+            free rates of a record's samples; outliers count for nothing, and with --offset free a
+            constant is fitted beside the terms
+  best      least_squares for a noisy record or --offset free, else the better of neutral and
+            polished
+
+After the interval the response is assumed to stay within its largest value over the last tenth of
+it. Every fit is held to that there, or to its error if that is larger, and what it provably never
+exceeds is printed and written beside the assumption.
 
 Records: a fit is made on the samples and its error measured there; only what the sum strays
 between samples beyond the record's own bends is counted too. Methods that need a function (the
@@ -62,6 +72,10 @@ examples:
 
 # Parts of the onset from which on a fit is doubted: what is left at the end, and the error.
 MOST_LEFT, LARGE_ERROR = 0.9, 0.5
+# `--offset free`: the constant is fitted beside the terms.
+FREE = "free"
+# Outliers whose times are printed, and written.
+MOST_SHOWN, MOST_WRITTEN = 8, 1000
 
 
 def parser() -> argparse.ArgumentParser:
@@ -76,18 +90,27 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument(
         "-n",
         "--terms",
-        type=int,
+        type=number_of_terms,
         required=True,
-        help="number of real terms; a conjugate pair counts two",
+        help="number of real terms, a conjugate pair counting two; `auto`: as many as a noisy "
+        "record holds by BIC, else the fewest with an error below a thousandth of the onset",
     )
     top.add_argument("-o", "--output", type=Path, help="model file to write (.yaml)")
     top.add_argument("--name", help="the model's name; default: that of the output file")
     top.add_argument("--method", choices=METHODS, default="best", help="default: %(default)s")
     top.add_argument(
-        "--norm", choices=NORMS, default="inf", help="of the coefficients' fit; %(default)s"
+        "--norm",
+        choices=(AUTO, *NORMS),
+        default=AUTO,
+        help="of the coefficients' fit; auto: 2 after least_squares, else inf",
     )
     add_method_options(top)
     return top
+
+
+def number_of_terms(text: str) -> int | str:
+    """Return a number of terms, or "auto"."""
+    return AUTO if text == AUTO else int(text)
 
 
 def add_method_options(top: argparse.ArgumentParser) -> None:
@@ -106,11 +129,29 @@ def add_method_options(top: argparse.ArgumentParser) -> None:
         metavar="RATE",
         help="a known rate of the tail [1/s], as --tail-rate=-0.4+2j; may be repeated (neutral)",
     )
+    top.add_argument(
+        "--keep-outliers",
+        action="store_true",
+        help="count samples that stand out from their neighbours like all others (least_squares)",
+    )
+    top.add_argument(
+        "--free-tail",
+        action="store_true",
+        help="do not hold the sum after the interval, where it may then do anything",
+    )
 
 
 def method_options(options: argparse.Namespace) -> Options:
     """Return the options of single methods as the library takes them."""
-    return Options(options.max_delay, options.degree, options.allow_unstable, options.tail_rate)
+    return Options(
+        options.max_delay,
+        options.degree,
+        options.allow_unstable,
+        options.tail_rate,
+        robust=not options.keep_outliers,
+        offset=options.offset == FREE,
+        bounded=not options.free_tail,
+    )
 
 
 def show_progress(line: str) -> None:
@@ -160,10 +201,13 @@ def doubts(result: DecayFit, given: DecayInput) -> list[str]:
 
 
 def between(result: DecayFit, given: DecayInput) -> float | None:
-    """Return how far the sum is from straight lines between samples; None for an example."""
+    """Return how far the sum is from lines between samples but outliers; None for an example."""
     if not isinstance(given.target, Record):
         return None
-    return largest_error(result.fit.sum, given.target.lines, 0.0, given.end)
+    times = given.target.knots
+    kept = ~np.isin(times, result.outliers)
+    lines = PiecewiseLinear(times[kept], given.target.values[kept])
+    return largest_error(result.fit.sum, lines, 0.0, given.end)
 
 
 def report(result: DecayFit, given: DecayInput) -> None:
@@ -195,12 +239,44 @@ def report(result: DecayFit, given: DecayInput) -> None:
                 f"would lower it by {max(gap, 0.0):.1e} of itself at most",
             )
         )
+    if result.noise:
+        rows.append(("noise", f"{result.noise:.3g}, the standard deviation of a sample"))
+    if len(result.outliers):
+        rows.append(("outliers", outliers_in_words(result)))
+    if result.terms_tried:
+        rows.append(("tried", tried_in_words(result)))
+    if fit.sum.constant:
+        rows.append(("constant", f"{fit.sum.constant:.6g}, to which the sum decays"))
     if after is not None:
         rows.append(("beyond", f"{after:.4e} on [{given.end:g}, {given.horizon:g}] s"))
+    if result.tail is not None:
+        rows.append(("assumed", result.tail.assumption))
+        rows.append(
+            (
+                "bound",
+                f"the sum stays within {result.tail.bound:.4g} there, so that its error is at "
+                f"most {result.tail.error:.4g}",
+            )
+        )
     rows.append(("right-most", f"{slowest.real:.4g} {slowest.imag:+.4g}i 1/s"))
     rows.append(("time", f"{result.seconds:.2f} s"))
     for label, value in rows:
         print(f"{label:<11} {value}")
+
+
+def outliers_in_words(result: DecayFit) -> str:
+    """Return how many samples were taken as outliers, and when the first of them were."""
+    shown = ", ".join(f"{time:.6g}" for time in result.outliers[:MOST_SHOWN])
+    more = ", ..." if len(result.outliers) > MOST_SHOWN else ""
+    return f"{counted(len(result.outliers), 'sample')} left out, at {shown}{more} s"
+
+
+def tried_in_words(result: DecayFit) -> str:
+    """Return the numbers of terms that were compared, with their criterion."""
+    least = min(tried.bic for tried in result.terms_tried)
+    return "BIC above the least: " + ", ".join(
+        f"{tried.terms} terms {tried.bic - least:.1f}" for tried in result.terms_tried
+    )
 
 
 def provenance(result: DecayFit, given: DecayInput) -> dict[str, Any]:
@@ -212,7 +288,7 @@ def provenance(result: DecayFit, given: DecayInput) -> dict[str, Any]:
         **choice.parameters,
         "terms": fit.sum.terms,
         "norm_value": fit.grid_error,
-        "lower_bound": fit.lower_bound,
+        **({"lower_bound": fit.lower_bound} if np.isfinite(fit.lower_bound) else {}),
         "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
         "version": __version__,
     }
@@ -220,6 +296,11 @@ def provenance(result: DecayFit, given: DecayInput) -> dict[str, Any]:
         values["start"] = given.start
     if given.offset:
         values["offset"] = given.offset
+    if len(result.outliers):
+        values["outlier_times"] = result.outliers[:MOST_WRITTEN].tolist()
+    if result.terms_tried:
+        values["terms_tried"] = [tried.terms for tried in result.terms_tried]
+        values["bic"] = [tried.bic for tried in result.terms_tried]
     after = beyond(result, given)
     if after is not None:
         values["error_beyond"] = after
@@ -240,6 +321,8 @@ def model_of(result: DecayFit, given: DecayInput, name: str) -> DecayModel:
         norm=result.fit.norm,
         max_error=result.fit.max_error,
         system=result.choice.system,
+        tail=result.tail,
+        noise=result.noise,
         fit=provenance(result, given),
     )
 
@@ -259,6 +342,10 @@ def refuse_options_of_others(options: argparse.Namespace) -> None:
         refuse_unused(top, options, OF_RESPONSES, "for a CSV file")
     if options.method != "dde":
         refuse_unused(top, options, ["max_delay", "degree", "allow_unstable"], "for --method dde")
+    if options.method not in ("least_squares", "best"):
+        refuse_unused(top, options, ["keep_outliers"], "for --method least_squares or best")
+        if options.offset == FREE:
+            raise RangeError("--offset free is for --method least_squares or best")
     if options.method not in ("neutral", "best"):
         refuse_unused(top, options, ["tail_rate"], "for --method neutral or best")
 
@@ -271,7 +358,7 @@ def run(options: argparse.Namespace) -> None:
     refuse_options_of_others(options)
     chosen = method_options(options)
     given = read_input(options)
-    given.require_samples_for(options.terms)
+    given.require_samples_for(1 if options.terms == AUTO else options.terms)
     result = fit_decay(
         given.target,
         options.terms,

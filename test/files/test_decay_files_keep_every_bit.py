@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from limit_surface_ros.decay.delay.pieces import PiecewisePolynomial
 from limit_surface_ros.decay.delay.system import DelaySystem
 from limit_surface_ros.decay.exponential_sum import ExponentialSum
+from limit_surface_ros.decay.tail import Tail
 from limit_surface_ros.errors import FileError, RangeError
 from limit_surface_ros.files.decay_file import DecayModel, read_decay_model, write_decay_model
 
@@ -149,3 +150,16 @@ def test_a_model_that_decays_to_a_constant_is_kept(tmp_path):
     back = read_decay_model(tmp_path / "model.yaml").sum
     assert back.constant == 0.25
     assert back.time_to_level(0.5) == x.time_to_level(0.5)
+
+
+def test_what_a_model_states_of_its_tail_and_noise_is_kept(tmp_path):
+    tail = Tail(0.1, 0.30000000000000004, "after 6 s it stays small")
+    model = DecayModel("m", a_model().sum, (0.0, 6.0), "2", 0.1, tail=tail, noise=0.1 + 0.2)
+    write_decay_model(model, tmp_path / "model.yaml")
+    back = read_decay_model(tmp_path / "model.yaml")
+    assert back.tail == tail
+    assert back.noise == model.noise
+    text = (tmp_path / "model.yaml").read_text()
+    (tmp_path / "model.yaml").write_text(text.replace("envelope: 0.1", "envelope: -0.1"))
+    with pytest.raises(FileError, match="envelope"):
+        read_decay_model(tmp_path / "model.yaml")

@@ -154,9 +154,7 @@ def test_more_terms_than_the_samples_determine_are_refused(tmp_path, capsys):
     assert "there are 41" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("growth", "warned"), [(0.3, True), (0.0, True), (-0.05, False), (-2.0, False)]
-)
+@pytest.mark.parametrize(("growth", "warned"), [(0.0, True), (-0.05, False), (-2.0, False)])
 def test_a_response_that_does_not_decay_is_warned_of(tmp_path, capsys, growth, warned):
     record, times = tmp_path / "record.csv", np.linspace(0.0, 6.0, 61)
     record.write_text("\n".join(f"{t},{np.exp(growth * t)}" for t in times))

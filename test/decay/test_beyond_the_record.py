@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""After the record no model exceeds what it states, and an honest assumption bounds its error."""
+
+import numpy as np
+import pytest
+
+from limit_surface_ros.decay.coefficients import fit_response
+from limit_surface_ros.decay.fit import Options, fit_decay
+from limit_surface_ros.decay.tail import envelope_of
+from limit_surface_ros.decay.targets import PiecewiseLinear, Record
+from limit_surface_ros.files.decay_file import DecayModel
+
+
+def held(t):
+    """8 N for 3 s, then released within half a second."""
+    return 8.0 * np.clip((3.5 - t) / 0.5, 0.0, 1.0)
+
+
+def kinky(t):
+    """A record that still stands at 0.3 when it ends."""
+    return np.interp(t, [0.0, 1.0, 1.7, 3.1, 6.0], [1.0, 0.6, 0.75, 0.2, 0.3])
+
+
+def record(function, end, noise=0.0, seed=0, samples=None):
+    times = np.linspace(0.0, end, samples or round(100.0 * end) + 1)
+    random = np.random.default_rng(seed)
+    return Record(times, function(times) + noise * random.normal(size=len(times)))
+
+
+def highest_after(x, end):
+    return float(np.abs(x(np.linspace(end, 10.0 * end, 100_001))).max())
+
+
+def test_a_held_and_released_load_is_met_and_stays_away():
+    fit = fit_decay(record(held, 6.0), 15, 6.0)
+    assert fit.fit.max_error <= 0.18
+    assert highest_after(fit.fit.sum, 6.0) <= fit.tail.bound <= 0.2
+    assert fit.tail.envelope == 0.0
+    assert "after 6 s" in fit.tail.assumption
+
+
+def test_a_free_tail_explodes_where_a_bounded_one_does_not():
+    cut = record(held, 3.3)
+    free = fit_decay(cut, 5, 3.3, options=Options(bounded=False))
+    assert free.tail is None
+    bounded = fit_decay(cut, 5, 3.3)
+    assert highest_after(bounded.fit.sum, 3.3) <= bounded.tail.bound < 9.0
+    assert highest_after(free.fit.sum, 3.3) > 100.0
+    assert bounded.fit.max_error < 1.1 * free.fit.max_error
+
+
+@pytest.mark.parametrize(("function", "end"), [(held, 6.0), (held, 3.3), (kinky, 6.0)])
+@pytest.mark.parametrize("method", ["neutral", "esprit", "polished", "least_squares"])
+def test_no_method_exceeds_what_it_states(function, end, method):
+    fit = fit_decay(record(function, end), 7, end, method)
+    assert highest_after(fit.fit.sum, end) <= fit.tail.bound
+    # Least squares weigh what comes after against the misfit; the others allow no more.
+    most = 3.0 if method == "least_squares" else 1.05
+    assert fit.tail.bound <= most * max(fit.tail.envelope, fit.fit.max_error)
+
+
+@pytest.mark.parametrize("norm", ["inf", "2", "1", lambda e: float(np.sum(e**4) ** 0.25)])
+def test_every_norm_is_held(norm):
+    cut = record(held, 3.3)
+    fit = fit_decay(cut, 7, 3.3, "esprit", norm)
+    assert highest_after(fit.fit.sum, 3.3) <= fit.tail.bound
+    assert fit.tail.bound <= 1.05 * max(fit.tail.envelope, fit.fit.max_error)
+
+
+def test_a_sum_that_stays_by_itself_is_not_changed():
+    stick = PiecewiseLinear(np.array([0.0, 1.0]), np.array([1.0, 0.0]))
+    rates = [-4.0, -3.2 + 4.4j, -1.1 + 10.0j]
+    free = fit_response(rates, stick, 19.0)
+    bounded = fit_response(rates, stick, 19.0, envelope=0.0)
+    np.testing.assert_array_equal(free.sum.coefficients, bounded.sum.coefficients)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01, 0.05])
+def test_the_error_after_a_noisy_record_is_within_what_is_stated(noise):
+    responses = [
+        lambda t: 0.5 * np.exp(-0.4 * t) + 0.5 * np.exp(-3.0 * t),
+        lambda t: 1.0 / (1.0 + t) ** 2,
+        lambda t: np.exp(-0.7 * t) * np.cos(5.0 * t),
+    ]
+    later = np.linspace(6.0, 30.0, 5001)
+    for seed, response in enumerate(responses):
+        noisy = record(response, 6.0, noise, seed, samples=200)
+        fit = fit_decay(noisy, 3, 6.0)
+        assert np.abs(fit.fit.sum(later) - response(later)).max() <= fit.tail.error
+
+
+def test_the_envelope_is_the_largest_value_of_the_last_tenth_but_for_outliers():
+    times = np.linspace(0.0, 10.0, 201)
+    values = np.exp(-0.1 * times)
+    assert envelope_of(Record(times, values), 10.0) == pytest.approx(np.exp(-0.9))
+    values = values.copy()
+    values[195] = 7.0
+    assert envelope_of(Record(times, values), 10.0) == pytest.approx(np.exp(-0.9))
+
+
+def test_a_model_states_its_bounds_where_something_is_known():
+    fit = fit_decay(record(kinky, 6.0), 5, 6.0)
+    model = DecayModel("k", fit.fit.sum, (0.0, 6.0), "inf", fit.fit.max_error, tail=fit.tail)
+    bounds = model.bounds([0.0, 6.0, 6.1, 1e6])
+    np.testing.assert_array_equal(bounds[:2], model.max_error)
+    np.testing.assert_array_equal(bounds[2:], max(fit.tail.error, model.max_error))
+    silent = DecayModel("k", fit.fit.sum, (1.0, 6.0), "inf", 0.1)
+    np.testing.assert_array_equal(silent.bounds([0.5, 3.0, 7.0]), [np.nan, 0.1, np.nan])
