@@ -11,6 +11,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+# Files of requirements/ that bring an extra into a clone, where that is not extras.txt.
+_GROUPS = {"peers": "bench"}
+
 
 class LimitSurfaceError(Exception):
     """Base of every error that this package raises on purpose."""
@@ -123,5 +126,6 @@ class MissingExtraError(LimitSurfaceError, ImportError):
         """Name the missing `library` and the `extra` of setup.py that it belongs to."""
         super().__init__(
             f"{library} is needed here and is not installed: pip install {library} "
-            f"(it belongs to the optional extra '{extra}')"
+            f"(in a clone: scripts/with_ros --with {_GROUPS.get(extra, 'extras')} COMMAND; "
+            f"it is of the optional extra '{extra}')"
         )

@@ -44,7 +44,7 @@ such as
   --ros-args -p "model_files:=['/path/to/model.yaml']" -p normal_force:=5.0"""
 _ADDRESSED = (
     "parameters go to all nodes of the process; -p NODE:NAME:=VALUE, such as "
-    "-p limit_surface:model_files:=[...], and parameter files address one"
+    '-p "limit_surface:model_files:=[...]", and parameter files address one'
 )
 # What names the folder of the log, for rcl.
 _HOMES = ("ROS_LOG_DIR", "ROS_HOME", "HOME")

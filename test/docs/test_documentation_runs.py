@@ -220,6 +220,16 @@ def test_the_first_hour_ends_with_a_model_a_picture_and_answers(tmp_path, enviro
     assert "median" in run.stdout
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_brackets_in_commands_stand_in_quotes_as_zsh_wants_them(page):
+    for block in blocks_of(page):
+        if block.language == "python":
+            continue
+        for command in commands_of(block.text):
+            bare = re.sub(r"'[^']*'|\"[^\"]*\"|\s# .*|<<.*", "", command, flags=re.DOTALL)
+            assert "[" not in bare, command
+
+
 def test_a_block_that_fails_fails_the_page(tmp_path, environment):
     for text in ("ros2 service nonsense", "make no_such_target", "rviz2 -d absent.rviz", "false"):
         script = script_of([Block("bash", text + "\n")])
