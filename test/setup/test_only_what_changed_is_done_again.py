@@ -87,3 +87,17 @@ def test_help_tells_every_target() -> None:
     assert len(targets) > 5
     for target in targets:
         assert f"\n  {target} " in answer
+
+
+def test_a_changed_lock_of_ros_is_noticed(tmp_path: Path) -> None:
+    from venv_dir import VenvDir
+
+    folder = tmp_path / "requirements"
+    folder.mkdir()
+    for name in ("ros.txt", "ros.lock", "test.txt"):
+        (folder / name).write_text("1")
+    venv = VenvDir(tmp_path, system_ros=False)
+    before = {group: venv._key(group) for group in ("ros", "test")}
+    (folder / "ros.lock").write_text("2")
+    assert venv._key("ros") != before["ros"]
+    assert venv._key("test") == before["test"]
