@@ -15,8 +15,7 @@ from limit_surface_ros.decay.fit import METHODS, fit_decay
 from limit_surface_ros.errors import LimitSurfaceError, RangeError
 from limit_surface_ros.tools.decay_input import add_input_options, read_input
 from limit_surface_ros.tools.fit_decay import add_method_options, beyond, method_options
-from limit_surface_ros.tools.program import run_program
-from limit_surface_ros.tools.progress import progress_bar
+from limit_surface_ros.tools.program import progress_bar, run_program
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -36,10 +36,8 @@ from limit_surface_ros.surface.kinds.polynomial import Polynomial
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.measures import load_error, quantiles, velocity_error
 from limit_surface_ros.tools.fit_options import OF_AUTO
-from limit_surface_ros.tools.given_options import named_path, refuse_unused
-from limit_surface_ros.tools.output_file import check_output
-from limit_surface_ros.tools.program import run_program
-from limit_surface_ros.tools.progress import progress_bar
+from limit_surface_ros.tools.options import check_output, named_path, refuse_unused
+from limit_surface_ros.tools.program import progress_bar, run_program
 from limit_surface_ros.tools.same_point import About, require_one_point
 from limit_surface_ros.tools.surface_fit import (
     RANGES,

@@ -30,9 +30,8 @@ from limit_surface_ros.fitting.workers import available_cores, worker_processes
 from limit_surface_ros.surface.convexity import NotConvexWarning
 from limit_surface_ros.tools.executors import CLUSTER_IN_FLIGHT, check_address, dask_executor
 from limit_surface_ros.tools.fit_options import refuse_options_of_others
-from limit_surface_ros.tools.given_options import refuse_empty
-from limit_surface_ros.tools.program import FAILED, run_program
-from limit_surface_ros.tools.progress import progress_bar
+from limit_surface_ros.tools.options import refuse_empty
+from limit_surface_ros.tools.program import FAILED, progress_bar, run_program
 from limit_surface_ros.tools.surface_fit import (
     add_fit_options,
     add_frame_option,

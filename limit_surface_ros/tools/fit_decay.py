@@ -30,8 +30,7 @@ from limit_surface_ros.files.decay_file import DecayModel, write_decay_model
 from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
 from limit_surface_ros.tools.csv_options import OF_RESPONSES
 from limit_surface_ros.tools.decay_input import add_input_options, read_input
-from limit_surface_ros.tools.given_options import refuse_empty, refuse_unused
-from limit_surface_ros.tools.output_file import check_output
+from limit_surface_ros.tools.options import check_output, refuse_empty, refuse_unused
 from limit_surface_ros.tools.program import run_program
 from limit_surface_ros.tools.training_data import is_bag
 

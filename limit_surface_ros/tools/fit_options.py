@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from limit_surface_ros.files.bag_pushes import Selection
 from limit_surface_ros.tools.csv_options import OF_CELLS
-from limit_surface_ros.tools.given_options import refuse_unused
+from limit_surface_ros.tools.options import refuse_unused
 from limit_surface_ros.tools.surface_fit import objective_of
 from limit_surface_ros.tools.training_data import BAG, CONTACT, PUSHES
 

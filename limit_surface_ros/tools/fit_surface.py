@@ -17,10 +17,8 @@ from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
 from limit_surface_ros.fitting.search import AGREEMENT, process_pool
 from limit_surface_ros.fitting.workers import available_cores
 from limit_surface_ros.tools.fit_options import refuse_options_of_others
-from limit_surface_ros.tools.given_options import named_path, refuse_empty
-from limit_surface_ros.tools.output_file import check_output
-from limit_surface_ros.tools.program import run_program
-from limit_surface_ros.tools.progress import progress_bar
+from limit_surface_ros.tools.options import check_output, named_path, refuse_empty
+from limit_surface_ros.tools.program import progress_bar, run_program
 from limit_surface_ros.tools.surface_fit import (
     add_fit_options,
     add_frame_option,

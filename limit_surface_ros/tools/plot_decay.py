@@ -15,7 +15,7 @@ from limit_surface_ros.plots.canvas import save_figure
 from limit_surface_ros.plots.decay_view import PROJECTION, draw_decay
 from limit_surface_ros.tools.csv_options import add_response_options, response_of_csv
 from limit_surface_ros.tools.decay_input import after, without
-from limit_surface_ros.tools.picture_options import add_picture_options, check_picture
+from limit_surface_ros.tools.options import add_picture_options, check_picture
 from limit_surface_ros.tools.program import run_program
 
 if TYPE_CHECKING:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the command line programs share: errors and warnings as one line, quiet interrupts."""
+"""What all programs share: errors and warnings in one line, quiet interrupts, a progress bar."""
 
 from __future__ import annotations
 
@@ -15,7 +15,15 @@ from limit_surface_ros.start import INTERRUPTED
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Callable, Iterator, Sequence
-    from typing import TextIO
+    from typing import Protocol, TextIO
+
+    class Progress(Protocol):
+        """Shows how far long work has come."""
+
+        def __call__(self, done: int, total: int, failed: int = 0) -> None:
+            """Show that `done` of `total` are done, `failed` of them without success."""
+            ...
+
 
 FAILED = 1
 USAGE_ERROR = 2
@@ -36,9 +44,9 @@ def run_program(
         interrupted: What to say after Ctrl-C.
 
     Returns:
-        0, or what `run` returns; 2 with one line on standard error when the input is at fault;
-        1 when nobody reads on, without a word, or the system refuses something; 130 when
-        interrupted.
+        What `run` returns, or 0. After a fault of the input 2, with one line on standard error;
+        after one of the system, such as a full disk, 1 with a line; 1 without a line if whoever
+        read the output has closed it; 130 after an interrupt.
     """
     arguments = parser.parse_args(argv)
     try:
@@ -52,10 +60,10 @@ def run_program(
         print(f"{parser.prog}: {interrupted}", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
-        _give_up_unwritten_output()
+        _discard_unwritten_output()
         return FAILED
     except OSError as error:
-        _give_up_unwritten_output()
+        _discard_unwritten_output()
         print(f"{parser.prog}: error: {error}", file=sys.stderr)
         return FAILED
     return code or 0
@@ -84,9 +92,33 @@ def _plain_warnings(program: str) -> Iterator[None]:
         warnings.showwarning = before
 
 
-def _give_up_unwritten_output() -> None:
-    """Let the interpreter end without trying, and failing, once more to write what is left."""
+def _discard_unwritten_output() -> None:
+    """Lead standard output to the null device: the interpreter flushes it once more at its end."""
     try:
         sys.stdout.flush()
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+@contextmanager
+def progress_bar(what: str) -> Iterator[Progress]:
+    """Give a function that takes (done, in all, failed) and draws a bar on standard error.
+
+    It draws nothing where standard error is no terminal or tqdm is not installed.
+    """
+    try:
+        from tqdm import tqdm
+    except ImportError:
+        yield lambda done, total, failed=0: None
+        return
+    # Its thread would keep pools of processes from forking, and watches for what we do not do.
+    tqdm.monitor_interval = 0
+    with tqdm(desc=what, disable=None, leave=False, file=sys.stderr) as bar:
+
+        def show(done: int, total: int, failed: int = 0) -> None:
+            bar.total = total
+            if failed:
+                bar.set_postfix(failed=failed, refresh=False)
+            bar.update(done - bar.n)
+
+        yield show

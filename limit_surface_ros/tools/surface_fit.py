@@ -22,7 +22,7 @@ from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.second_approximation import fit_second_approximation
 from limit_surface_ros.surface.kinds.power_sum import thesis_exponents
 from limit_surface_ros.tools.csv_options import add_cell_options, cell_options
-from limit_surface_ros.tools.given_options import check_ranges
+from limit_surface_ros.tools.options import check_ranges
 from limit_surface_ros.tools.training_data import (
     BAG,
     CONTACT,
