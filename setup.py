@@ -66,7 +66,7 @@ setup(
     entry_points={
         # Not the modules themselves: Ctrl-C would end their imports with a traceback.
         "console_scripts": [
-            f"{name} = {PACKAGE}.start:{module.removeprefix(f'{PACKAGE}.')}"
+            f"{name} = {PACKAGE}.runtime:{module.removeprefix(f'{PACKAGE}.')}"
             for name, module in PROGRAMS.items()
         ],
     },

@@ -21,7 +21,7 @@ import time
 from importlib import metadata
 from pathlib import Path
 
-from limit_surface_ros.blas_threads import use_one_by_default
+from limit_surface_ros.runtime import use_one_blas_thread
 
 FOLDER = Path(__file__).resolve().parent
 RESULTS = FOLDER / "RESULTS.md"
@@ -83,7 +83,7 @@ def main(names: list[str]) -> int:
         print(f"no benchmark {unknown[0]!r}; there are {', '.join(programs)}", file=sys.stderr)
         return 2
     sections = kept_sections()
-    use_one_by_default()
+    use_one_blas_thread()
     failed = []
     for name in names or programs:
         print(f"\n== {name}", flush=True)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-# Every so many steps the bracket is halved if the values did not fall much meanwhile.
-_LOOK = 4
-_MUCH = 0.5
+# Every so many steps the bracket is halved, unless the value has fallen to this part of itself.
+_STEPS = 4
+_PART = 0.5
 
 
 def root_bracket(
@@ -32,8 +32,8 @@ def root_bracket(
         high: Upper end.
         width: Of a bracket that is narrow enough; 0 for the next number.
         exact: Size of a value that counts as 0.
-        straight: Product of the sizes of the values at both ends up to which who calls takes the
-            function for straight between them.
+        straight: If -f(low) f(high) is at most this, stop: the function is straight enough
+            between both ends to be interpolated there.
 
     Returns:
         Both ends; the same place twice if a value there counts as 0.
@@ -53,23 +53,23 @@ def root_bracket(
         # An end that stays for a second time counts less, so that the next secant moves it.
         if value < 0.0:
             if side < 0.0:
-                above *= _less(value / below)
+                above *= _weight(value / below)
             low, below, at_low = place, value, value
         else:
             if side > 0.0:
-                below *= _less(value / above)
+                below *= _weight(value / above)
             high, above, at_high = place, value, value
         side = value
         step += 1
         slow = False
-        if step % _LOOK == 0:
-            slow, before = abs(value) > _MUCH * before, abs(value)
+        if step % _STEPS == 0:
+            slow, before = abs(value) > _PART * before, abs(value)
     return low, high
 
 
-def _less(fallen: float) -> float:
-    """Return for how much an end counts beside the other, which has fallen to a part of itself.
+def _weight(fallen: float) -> float:
+    """Return the weight of the end that stays, as the value at the other fell by this factor.
 
-    So much that a parabola through the last three places would be met.
+    With it the next secant meets the parabola through the last three places.
     """
     return 1.0 - fallen if fallen < 1.0 else 0.5

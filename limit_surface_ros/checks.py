@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     Bools: TypeAlias = NDArray[np.bool_]
     Places: TypeAlias = NDArray[np.intp]
 
-# Components beyond these are no loads or motions of this world, and products of them overflow.
+# Components larger than this, or vectors smaller, are refused: their products would overflow.
 LARGEST = 1.0e100
 SMALLEST = 1.0e-100
 _REAL = (float, int)
@@ -77,10 +77,10 @@ def as_vectors(name: str, values: ArrayLike) -> Floats:
 
 
 def as_rows(name: str, values: ArrayLike) -> Floats:
-    """Return `values` as a float64 array of shape (..., 3), whose numbers are not looked at.
+    """Return `values` as a float64 array of shape (..., 3), whose numbers are not checked.
 
-    For those who come by the size of each vector anyway: what is wrong with one `as_vectors` or
-    `as_directions` tells.
+    Callers that compute the norm of each vector check them by it, and call `as_vectors` or
+    `as_directions` for the error.
 
     Raises:
         ShapeError: The last axis does not hold three components, or no numbers.
@@ -99,9 +99,10 @@ def _as_numbers(name: str, values: ArrayLike) -> Floats:
 
 
 def one_direction(values: Any) -> tuple[float, float, float] | None:
-    """Return a single, plainly valid vector as three floats, None for anything else.
+    """Return one valid vector as three floats, or None if it is anything else.
 
-    The quick way in for callers with one vector: what it does not take, `as_directions` judges.
+    The fast path for one vector: what it returns None for, callers give to `as_directions`, which
+    converts it or raises.
     """
     if type(values) is np.ndarray:
         if values.shape != (3,):

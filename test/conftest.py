@@ -6,11 +6,11 @@ import signal
 import pytest
 from hypothesis import settings
 
-from limit_surface_ros.blas_threads import use_one_by_default
+from limit_surface_ros.runtime import use_one_blas_thread
 from process_helpers import end_all
 
 # Before numpy is imported: on a busy machine threads of BLAS make some tests fifteen times slower.
-use_one_by_default()
+use_one_blas_thread()
 
 # The same examples on every run, and no verdict on a busy machine's speed.
 settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=50)

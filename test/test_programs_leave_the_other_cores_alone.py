@@ -7,16 +7,16 @@ import sys
 
 import pytest
 
-from limit_surface_ros.blas_threads import VARIABLES
+from limit_surface_ros.runtime import BLAS_VARIABLES
 
 SHOW = (
     "import os, sys, importlib; importlib.import_module(sys.argv[1]);"
-    f"print('numpy' in sys.modules, *[os.environ[name] for name in {VARIABLES}])"
+    f"print('numpy' in sys.modules, *[os.environ[name] for name in {BLAS_VARIABLES}])"
 )
 
 
 def shown(package: str, **environment: str) -> list[str]:
-    kept = {key: value for key, value in os.environ.items() if key not in VARIABLES}
+    kept = {key: value for key, value in os.environ.items() if key not in BLAS_VARIABLES}
     command = [sys.executable, "-c", SHOW, package]
     done = subprocess.run(command, env=kept | environment, capture_output=True, check=True)
     return done.stdout.decode().split()

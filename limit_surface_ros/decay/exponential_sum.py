@@ -26,7 +26,7 @@ from limit_surface_ros.decay.basis import (
 )
 from limit_surface_ros.decay.levels import VANISHED, LevelSearch
 from limit_surface_ros.errors import RangeError, ShapeError, UnstableError
-from limit_surface_ros.scratch import keep_scratch
+from limit_surface_ros.runtime import keep_scratch
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

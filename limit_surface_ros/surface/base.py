@@ -25,7 +25,7 @@ from limit_surface_ros.checks import (
     as_vectors,
     one_direction,
 )
-from limit_surface_ros.scratch import keep_scratch
+from limit_surface_ros.runtime import keep_scratch
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

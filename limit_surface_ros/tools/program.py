@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from limit_surface_ros.errors import LimitSurfaceError
-from limit_surface_ros.start import INTERRUPTED
+from limit_surface_ros.runtime import INTERRUPTED
 
 if TYPE_CHECKING:
     import argparse

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from limit_surface_ros import start
+from limit_surface_ros import runtime
 from process_helpers import REPOSITORY
 
 PROGRAM = [sys.executable, "-m", "limit_surface_ros.tools.fit_decay"]
@@ -50,7 +50,7 @@ def test_an_interrupt_while_a_program_still_imports_is_told_in_one_line(tmp_path
     )
     for name in ("numpy", "rclpy", "geometry_msgs"):
         (tmp_path / f"{name}.py").write_text(stand_in)
-    command = f"import sys; from limit_surface_ros.start import {package}; "
+    command = f"import sys; from limit_surface_ros.runtime import {package}; "
     command += f"sys.exit({package}.{program}())"
     paths = os.pathsep.join([str(tmp_path), str(REPOSITORY), os.environ.get("PYTHONPATH", "")])
     ended = subprocess.run(
@@ -74,5 +74,5 @@ def test_every_installed_program_starts_where_interrupts_are_quiet(monkeypatch):
     assert len(scripts) == len(programs) > 0
     for name, place in scripts:
         run = EntryPoint(name, place, "console_scripts").load()
-        assert run.func is start.run
+        assert run.func is runtime.run
         assert ".".join(run.args) == programs[name]

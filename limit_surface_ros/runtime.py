@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The process that the package runs in: how programs start, threads of BLAS, kept memory.
+
+A console script names `tools.PROGRAM` or `nodes.PROGRAM` of this module. What a program needs
+takes some tenths of a second to import, and only then can the program see to interrupts by itself:
+nothing slow is imported here, so that Ctrl-C is quiet from the first moment on.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import os
+import sys
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+# Exit code of a program that was interrupted: that of a shell for SIGINT.
+INTERRUPTED = 130
+# What BLAS libraries read when they are loaded.
+BLAS_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+# Rows of a batch whose temporaries the allocator keeps in any case.
+_FEW = 500
+# Temporaries of one block need less than this [bytes]; up to twice as much is then kept.
+_SCRATCH = 2**23
+
+
+def run(package: str, name: str) -> int:
+    """Import a program and run it.
+
+    Args:
+        package: Its package.
+        name: Its module there, which has a function `main`.
+
+    Returns:
+        The exit code: what `main` returns, or 130 after an interrupt that it did not see to.
+    """
+    try:
+        return int(importlib.import_module(f"{package}.{name}").main())
+    except KeyboardInterrupt:
+        sys.stderr.write(f"{name}: interrupted\n")
+        return INTERRUPTED
+
+
+@dataclass(frozen=True)
+class Programs:
+    """The programs of a package, as attributes: functions that return an exit code.
+
+    Attributes:
+        package: Its dotted name.
+    """
+
+    package: str
+
+    def __getattr__(self, name: str) -> Callable[[], int]:
+        """Return what runs the program of that name."""
+        return functools.partial(run, self.package, name)
+
+
+tools = Programs("limit_surface_ros.tools")
+nodes = Programs("limit_surface_ros.nodes")
+
+
+def use_one_blas_thread() -> None:
+    """Keep BLAS to one thread, unless the environment says otherwise.
+
+    All our products are of small matrices: threads only wait for each other in them, and starve
+    the other processes of a fit or of a robot. It takes effect if numpy is not imported yet.
+    """
+    for variable in BLAS_VARIABLES:
+        os.environ.setdefault(variable, "1")
+
+
+def keep_scratch(rows: int) -> None:
+    """Keep the memory that temporaries of a batch of so many rows need, for the batches to come.
+
+    glibc gives freed memory back to the system unless it has seen a large piece freed before, and
+    each page that it asks for anew costs as much as hundreds of multiplications: without this a
+    process that does nothing else maps batches at a third of the speed.
+    """
+    if rows > _FEW:
+        _raise_trim_threshold()
+
+
+@functools.cache
+def _raise_trim_threshold() -> None:
+    """Free a large piece once: glibc then keeps up to twice as much of what is freed later."""
+    import numpy as np
+
+    # Its pages are never touched, so that it costs next to nothing.
+    np.empty(_SCRATCH, dtype=np.uint8)
