@@ -2,7 +2,7 @@
 # Every target sets up what it needs first: see scripts/with_ros.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help demo run test test_nightly lint docs bench clean
+.PHONY: help demo run test test_nightly test_exports lint docs bench clean
 
 PROGRAMS := install/limit_surface_ros/lib/limit_surface_ros
 SHARE := install/limit_surface_ros/share/limit_surface_ros
@@ -26,6 +26,10 @@ test: ## Run the tests against the built packages (ARGS go to pytest: ARGS="-k n
 test_nightly: ## Run the tests that take long, which `make test` leaves out (ARGS go to pytest)
 	@scripts/with_ros --with test --with extras --isolated -- python3 scripts/run_pytest.py \
 	    -m nightly --timeout 3600 $(ARGS)
+
+test_exports: ## Run the tests of exported models where CasADi, JAX and MuJoCo are (some 500 MB)
+	@scripts/with_ros --with test --with extras --with exports -- python3 scripts/run_pytest.py \
+	    test/export $(ARGS)
 
 lint: ## Check style, types and package descriptions
 	@scripts/with_ros --tools lint -- scripts/lint

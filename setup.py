@@ -14,6 +14,7 @@ EXTRAS = {
     "bags": ["rosbags"],
     "cluster": ["dask", "distributed"],
     "peers": ["cvxpy"],
+    "exports": ["casadi", "jax", "mujoco"],
     "docs": ["sphinx", "myst-parser", "furo", "sphinx-mathjax-offline"],
 }
 
@@ -21,6 +22,7 @@ EXTRAS = {
 PROGRAMS: dict[str, str] = {
     "fit_catalogue": "limit_surface_ros.tools.fit_catalogue",
     "compare_surfaces": "limit_surface_ros.tools.compare_surfaces",
+    "export_surface": "limit_surface_ros.tools.export_surface",
     "fit_surface": "limit_surface_ros.tools.fit_surface",
     "fit_decay": "limit_surface_ros.tools.fit_decay",
     "compare_decays": "limit_surface_ros.tools.compare_decays",
@@ -52,7 +54,7 @@ setup(
     maintainer="limit_surface_ros maintainers",
     maintainer_email="maintainers@users.noreply.github.com",
     packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
-    package_data={PACKAGE: ["py.typed"]},
+    package_data={PACKAGE: ["py.typed"], f"{PACKAGE}.export": ["templates/*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),

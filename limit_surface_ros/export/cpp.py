@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A surface as a C++17 header: all three maps and their Jacobians, without any dependency."""
+"""A surface as a C++17 header: all maps and their Jacobians, without any dependency."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from limit_surface_ros.export.portable import Corner, Portable
 
 _INVERSE = """\
-// Load of maximum dissipation: the wrench on the surface with the most power, and its derivative by
-// the twist [N s/m, ...] if `jacobian` is not null."""
+// Load of maximum dissipation: the wrench on the surface with the most power, and its derivative
+// by the twist [N s/m, ...] if `jacobian` is not null."""
 
 
 def cpp_header(model: Portable, name: str, title: str) -> str:
@@ -60,8 +60,7 @@ def _data(model: Portable) -> str:
         "// y^3 m, y^2 m^2, y m^3, m^4.",
         f"constexpr std::array<double, 15> coefficients{_braces(model.coefficients)};",
         "// Points of gauge 1 over half the sphere.",
-        f"constexpr std::array<Vector<double>, {len(model.starts)}> starts"
-        f"{_rows(model.starts)};",
+        f"constexpr std::array<Vector<double>, {len(model.starts)}> starts{_rows(model.starts)};",
     ]
     lines += [
         f"constexpr std::size_t corner_count = {len(model.corners)};",

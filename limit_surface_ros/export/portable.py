@@ -21,12 +21,11 @@ from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.kinds.polynomial import Polynomial
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
-from limit_surface_ros.surface.linalg import root_of
-from limit_surface_ros.surface.sphere import even_directions
+from limit_surface_ros.surface.linalg import even_directions, root_of
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.protocol import LimitSurface
+    from limit_surface_ros.surface.base import LimitSurface
 
 # Families of gauges, by the numbers that templates know them by.
 NORMS, POWERS, QUARTIC = 0, 1, 2
@@ -70,7 +69,7 @@ class Portable:
         coefficients: Of a polynomial, shape (15,); else zeros.
         characteristic_length: rho [m].
         friction_force: F0 [N].
-        mean_conjugate: Mean K of x -> g(x) grad g(x) = K x, shape (3, 3): an ellipsoid's own matrix.
+        mean_conjugate: Mean K of x -> g(x) grad g(x) = K x, shape (3, 3); an ellipsoid's own form.
         starts: Points of gauge 1 over half the sphere, shape (d, 3).
         start_gradients: Gradients of the gauge there, shape (d, 3).
         corners: Of a sum of norms.
@@ -167,9 +166,7 @@ def portable(surface: LimitSurface) -> Portable:
     )
 
 
-def _gauge(
-    surface: LimitSurface, gauge_of_loads: bool, points: Floats
-) -> tuple[Floats, Floats]:
+def _gauge(surface: LimitSurface, gauge_of_loads: bool, points: Floats) -> tuple[Floats, Floats]:
     """Return a surface's gauge (d,) and its gradients (d, 3) at scaled points (d, 3)."""
     unit_of_loads, unit_of_twists = surface.scaling.wrench_unit, surface.scaling.twist_unit
     if not gauge_of_loads:

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.export.portable import Corner, Portable
 
-# Newton's method for the scale of a sum of powers is unrolled: from its start this many steps leave
-# nothing for exponents from 1/10 on.
+# Newton's method for the scale of a sum of powers is unrolled: from its start these steps leave
+# nothing.
 _STEPS = 8
 # Steps of Newton's method on the way back, for each smoothing.
 _ROUNDS = 8
@@ -86,7 +86,7 @@ def casadi_module(model: Portable, name: str, title: str) -> str:
         "MODULE": identifier(name),
         "CONVEX": repr(model.convex),
         "CLOSED": _CLOSED[model.gauge_of_loads],
-        "START": nested(np.linalg.inv(model.mean_conjugate)),
+        "START": nested(np.asarray(np.linalg.inv(model.mean_conjugate), dtype=np.float64)),
         "CORNERS": f"[{', '.join(_corner(each) for each in model.corners if each.rest == 0.0)}]",
         "REGULAR": nested(_regular(model)),
         "ROUNDS": repr(_ROUNDS if model.family == NORMS else 3 * _ROUNDS),
@@ -111,7 +111,9 @@ def _corner(corner: Corner) -> str:
 
 def _regular(model: Portable) -> Floats:
     """Return a vector (3,) far from every cone: of those of the starts, the farthest."""
-    gradients = model.start_gradients / np.linalg.norm(model.start_gradients, axis=1)[:, np.newaxis]
+    gradients = (
+        model.start_gradients / np.linalg.norm(model.start_gradients, axis=1)[:, np.newaxis]
+    )
     distance = np.full(len(gradients), np.inf)
     for corner in model.corners:
         power = gradients @ corner.point
