@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from limit_surface_ros.export.targets import SUFFIXES, export_surface
 from limit_surface_ros.files.atomic_write import write_atomically
 from limit_surface_ros.files.surface_file import read_surface_model
-from limit_surface_ros.tools.output_file import check_output
+from limit_surface_ros.tools.options import check_output
 from limit_surface_ros.tools.program import run_program
 
 if TYPE_CHECKING:
