@@ -2,10 +2,16 @@
 """Contact files: where and how hard a body presses on the ground, in YAML.
 
 Keys: `schema: 1`, `name`, `frame_id` (default "object"), `reference_point` ("centroid", the
-default, or [x, y] in metres), and one of two descriptions. All lengths are metres, forces newtons.
+default, or [x, y] in metres), `symmetry` ("auto", the default, "none", or a list of the axes x
+and y about which a fitted model is to be its own mirror image), and one of two descriptions. All
+lengths are metres, forces newtons.
 
-Support points: `points` ([x, y] each) and `friction_limits` (mu N of each); `normal_force` of the
-whole body is optional: it tells at which weight the limits hold.
+Support points: `points` ([x, y] each) and what each can resist with, one of
+  `friction_limits`: mu N of each; `normal_force` of the whole body is optional: it tells at which
+    weight the limits hold;
+  `friction_coefficient` and `loads`, the normal force of each;
+  `friction_coefficient`, `normal_force` of the whole body and its `centre_of_mass` [x, y]: three
+    feet or fewer by statics, more as springs, equal ones or of the given `stiffnesses`.
 
 A patch: `friction_coefficient`, `normal_force` of the whole body, `cells` (about how many, default
 1000, at most a million) and
@@ -19,7 +25,8 @@ A patch: `friction_coefficient`, `normal_force` of the whole body, `cells` (abou
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import pi
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,6 +36,8 @@ from limit_surface_ros.files.yaml_reader import read_yaml
 from limit_surface_ros.surface.contact import pressure as pressures
 from limit_surface_ros.surface.contact import shapes
 from limit_surface_ros.surface.contact.patch import ContactPatch, natural_scaling
+from limit_surface_ros.surface.contact.statics import support_loads
+from limit_surface_ros.surface.contact.symmetry import MIRRORS, mirror_axes
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 
 if TYPE_CHECKING:
@@ -46,6 +55,8 @@ MOST_CELLS = 1_000_000
 
 
 _ACCEPTED = "a contact has either `points` or a `shape`"
+# What hardly any body has: characteristic lengths [m], coefficients of friction, angles [rad].
+_LONG, _ROUGH, _TURN = 5.0, 2.0, 2.0 * pi
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +69,10 @@ class ContactModel:
         reference_point: About which the surface takes moments [m], shape (2,).
         normal_force: Weight on the contact [N]; None if the file gives friction limits alone.
         surface: Its exact limit surface; another weight is `surface.with_friction_force`.
+        of_points: Whether the contact is its support points, and not a patch cut into cells.
+        symmetry: Of the axes "x" and "y" those about which a model of it is to be symmetric.
+        load_method: How the loads of the feet were found, if they were; see `support_loads`.
+        doubts: What is not impossible but looks like a slip, such as other units; sentences.
     """
 
     name: str
@@ -65,6 +80,10 @@ class ContactModel:
     reference_point: Floats
     normal_force: float | None
     surface: PointContacts
+    of_points: bool = False
+    symmetry: tuple[str, ...] = ()
+    load_method: str | None = None
+    doubts: tuple[str, ...] = ()
 
 
 def read_contact(path: str | Path) -> ContactModel:
@@ -87,8 +106,47 @@ def read_contact(path: str | Path) -> ContactModel:
         model = _read_patch(section, name, frame_id, reference)
     else:
         raise section.error("points", f"missing; {_ACCEPTED}")
+    symmetry, unlike = _read_symmetry(section, model.surface)
     section.finish()
-    return model
+    return replace(model, symmetry=symmetry, doubts=(*model.doubts, *unlike))
+
+
+def doubts_of_contact(surface: PointContacts, friction_coefficient: float | None) -> list[str]:
+    """Return what of a contact looks like a slip: lengths of other units, impossible friction."""
+    doubts = []
+    length = surface.scaling.characteristic_length
+    if length > _LONG:
+        doubts.append(
+            f"the friction acts at a mean distance of {length:.3g} m from the reference point: "
+            "are the lengths in metres?"
+        )
+    if friction_coefficient is not None and friction_coefficient > _ROUGH:
+        doubts.append(
+            f"a friction coefficient of {friction_coefficient:g} is more than rubber has: is it a "
+            "percentage, or an angle?"
+        )
+    return doubts
+
+
+def _read_symmetry(section: Section, surface: PointContacts) -> tuple[tuple[str, ...], list[str]]:
+    """Return the axes of symmetry, and a doubt for each stated one that the contact has not."""
+    given = section.raw("symmetry", "auto")
+    found = mirror_axes(surface)
+    if given == "auto":
+        return found, []
+    if given == "none":
+        return (), []
+    if not isinstance(given, list) or any(axis not in MIRRORS for axis in given):
+        raise section.error(
+            "symmetry", f"must be auto, none, or a list of the axes x and y, got {given!r}"
+        )
+    stated = tuple(axis for axis in MIRRORS if axis in given)
+    return stated, [
+        f"symmetry about {axis} is stated, but the contact is not its own mirror image about the "
+        f"{axis} axis through the reference point: the model will be symmetric all the same"
+        for axis in stated
+        if axis not in found
+    ]
 
 
 def _refuse_models(section: Section) -> None:
@@ -117,17 +175,58 @@ def _read_points(
     section: Section, name: str, frame_id: str, reference: Floats | None
 ) -> ContactModel:
     points = section.array("points", (None, 2))
-    limits = section.array("friction_limits", (len(points),), at_least=0.0)
-    force = section.number("normal_force", above=0.0) if "normal_force" in section else None
-    chosen = points.mean(axis=0) if reference is None else reference
+    if "friction_limits" in section or "friction_coefficient" not in section:
+        key, mu, method = "friction_limits", None, None
+        limits = section.array(key, (len(points),), at_least=0.0)
+        force = section.number("normal_force", above=0.0) if "normal_force" in section else None
+    else:
+        key = "loads" if "loads" in section else "centre_of_mass"
+        mu = section.number("friction_coefficient", above=0.0)
+        loads, method = _read_loads(section, points)
+        limits, force = mu * loads, float(loads.sum())
+    chosen = _without_residues(points.mean(axis=0), points) if reference is None else reference
 
     def build() -> PointContacts:
         arms = points - chosen
         return PointContacts(arms, limits, natural_scaling(arms, limits))
 
+    surface = place_errors(section, key, build)
     return ContactModel(
-        name, frame_id, chosen, force, place_errors(section, "friction_limits", build)
+        name,
+        frame_id,
+        chosen,
+        force,
+        surface,
+        of_points=True,
+        load_method=method,
+        doubts=tuple(doubts_of_contact(surface, mu)),
     )
+
+
+def _read_loads(section: Section, points: Floats) -> tuple[Floats, str | None]:
+    """Return the normal forces of the feet [N], shape (n,), and how they were found."""
+    if "loads" in section:
+        return section.array("loads", (len(points),), at_least=0.0), None
+    if "normal_force" not in section or "centre_of_mass" not in section:
+        raise section.error(
+            "loads",
+            "missing; beside points and friction_coefficient stand either the loads of the "
+            "points, or normal_force and centre_of_mass of the body",
+        )
+    force = section.number("normal_force", above=0.0)
+    centre = section.array("centre_of_mass", (2,))
+    stiffnesses = (
+        section.array("stiffnesses", (len(points),)) if "stiffnesses" in section else None
+    )
+    found = place_errors(
+        section, "centre_of_mass", lambda: support_loads(points, force, centre, stiffnesses)
+    )
+    return found.loads, found.method
+
+
+def _without_residues(centre: Floats, points: Floats) -> Floats:
+    """Return a centre with coordinates that are rounding of zero set to 0."""
+    return np.where(np.abs(centre) <= 1e-12 * np.abs(points).max(), 0.0, centre)
 
 
 def _read_patch(
@@ -137,6 +236,7 @@ def _read_patch(
     force = section.number("normal_force", above=0.0)
     count = section.integer("cells", shapes.DEFAULT_COUNT, at_least=1, at_most=MOST_CELLS)
     shape = section.section("shape")
+    angle = float(shape.number("angle", 0.0))
     cells, mapped = place_errors(section, "shape", lambda: _read_shape(shape, count))
     shape.finish()
     if mapped is None:
@@ -147,7 +247,11 @@ def _read_patch(
         pressure = mapped
     patch = place_errors(section, "pressure", lambda: ContactPatch.of_shape(cells, pressure))
     chosen = patch.centroid if reference is None else reference
-    return ContactModel(name, frame_id, chosen, force, patch.surface(mu, force, chosen))
+    surface = patch.surface(mu, force, chosen)
+    doubts = doubts_of_contact(surface, mu)
+    if abs(angle) > _TURN:
+        doubts.append(f"the shape's angle of {angle:g} rad is more than a turn: is it in degrees?")
+    return ContactModel(name, frame_id, chosen, force, surface, doubts=tuple(doubts))
 
 
 def _read_shape(section: Section, count: int) -> tuple[Cells, Pressure | None]:
