@@ -4,8 +4,8 @@
 The link stands on what is lowest of its collision shapes along the z axis of its own frame: the
 face of a box, the end of a cylinder, the triangles of a mesh that lie in that plane; spheres,
 corners and the ends of edges are support points. Its mass presses evenly, or, if the centre of
-mass is off the middle, as a rigid body on an elastic ground does. The friction coefficient is `mu` of
-the first collision (SDF) or `mu1` of the link's gazebo element (URDF), unless one is given.
+mass is off the middle, as a rigid body on an elastic ground does. The friction coefficient is `mu`
+of the first collision (SDF) or `mu1` of the link's gazebo element (URDF), unless one is given.
 """
 
 from __future__ import annotations

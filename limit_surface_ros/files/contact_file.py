@@ -140,7 +140,7 @@ def _read_symmetry(section: Section, surface: PointContacts) -> tuple[tuple[str,
         raise section.error(
             "symmetry", f"must be auto, none, or a list of the axes x and y, got {given!r}"
         )
-    stated = tuple(axis for axis in MIRRORS if axis in given)
+    stated = tuple(sorted(set(given), key=lambda axis: (axis not in found[:1], axis)))
     return stated, [
         f"symmetry about {axis} is stated, but the contact is not its own mirror image about the "
         f"{axis} axis through the reference point: the model will be symmetric all the same"

@@ -34,9 +34,12 @@ from limit_surface_ros.fitting.objective import SumOfObjectives
 from limit_surface_ros.fitting.pairs import check_support, scale_pairs
 from limit_surface_ros.fitting.result import solve
 from limit_surface_ros.fitting.search import Search
+from limit_surface_ros.fitting.symmetric import images_of_terms, symmetric
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from limit_surface_ros.checks import Bools, Floats
     from limit_surface_ros.fitting.objective import Objective
     from limit_surface_ros.fitting.pairs import ScaledPairs
@@ -61,6 +64,7 @@ def fit_dissipation(
     floor: float = 1e-3,
     scaling: Scaling | None = None,
     search: Search | None = None,
+    symmetry: Sequence[str] = (),
 ) -> FitResult:
     """Fit D(v) = sum_k sqrt(v' B_k v), of which the load is the gradient.
 
@@ -77,6 +81,7 @@ def fit_dissipation(
             fitted on directions; see `factors`.
         scaling: Characteristic length and friction force; chosen from the pairs if not given.
         search: Starts, seed, where and how to run.
+        symmetry: Axes "x", "y" about which the surface is to be its own mirror image.
 
     Raises:
         RangeError: An argument is out of range.
@@ -86,11 +91,17 @@ def fit_dissipation(
     if terms < 1:
         raise RangeError(f"terms must be at least 1, got {terms}")
     scaled = scale_pairs(pairs, scaling)
-    check_support(scaled, PARAMETERS_PER_MATRIX * terms)
+    images = images_of_terms(terms, symmetry, alike=True)
+    check_support(scaled, images.shape[1])
     objective = dissipation_objective(
         scaled, terms, fitted_on, velocity_weight, robust_scale, floor
     )
-    return solve(objective, describe(fitted_on, velocity_weight), pairs, search or Search())
+    return solve(
+        symmetric(objective, images),
+        describe(fitted_on, velocity_weight),
+        pairs,
+        search or Search(),
+    )
 
 
 def dissipation_objective(

@@ -19,9 +19,12 @@ from limit_surface_ros.checks import as_floats
 from limit_surface_ros.errors import MissingExtraError, RangeError, SolverError
 from limit_surface_ros.fitting.pairs import check_support, scale_pairs
 from limit_surface_ros.fitting.result import FitResult, errors_on
+from limit_surface_ros.fitting.symmetric import with_mirror_images
 from limit_surface_ros.surface.kinds.polynomial import MONOMIALS, Polynomial
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.fitting.pairs import ScaledPairs
     from limit_surface_ros.surface.pairs import Pairs
@@ -34,6 +37,7 @@ def fit_polynomial(
     velocity_weight: float = 0.0,
     convex: bool = False,
     scaling: Scaling | None = None,
+    symmetry: Sequence[str] = (),
 ) -> FitResult:
     """Fit P(f) = 1, P homogeneous of degree four.
 
@@ -42,9 +46,11 @@ def fit_polynomial(
         velocity_weight: w.
         convex: Whether P must be convex; solved as a semidefinite program by cvxpy.
         scaling: Characteristic length and friction force; chosen from the pairs if not given.
+        symmetry: Axes "x", "y" about which the surface is to be its own mirror image: the pairs'
+            mirror images are fitted, too.
 
     Raises:
-        RangeError: The weight is negative.
+        RangeError: The weight is negative, or an axis is not known.
         DataError: The pairs cannot determine a polynomial.
         MatrixError: The polynomial of least squares is not positive, its surface not closed.
         SolverError: The semidefinite program has no solution.
@@ -56,6 +62,7 @@ def fit_polynomial(
     begin = time.perf_counter()
     scaled = scale_pairs(pairs, scaling)
     check_support(scaled, len(MONOMIALS))
+    scaled = with_mirror_images(scaled, symmetry)
     rows, targets = _least_squares(scaled, weight)
     coefficients = _convex_solution(rows, targets) if convex else _solution(rows, targets)
     residual = rows @ coefficients - targets

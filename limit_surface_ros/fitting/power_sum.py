@@ -34,9 +34,12 @@ from limit_surface_ros.fitting.motion_cost import direction_loss
 from limit_surface_ros.fitting.pairs import check_support, scale_pairs
 from limit_surface_ros.fitting.result import solve
 from limit_surface_ros.fitting.search import Search
+from limit_surface_ros.fitting.symmetric import images_of_terms, symmetric
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
@@ -61,6 +64,7 @@ def fit_power_sum(
     velocity_weight: float = 1.0,
     scaling: Scaling | None = None,
     search: Search | None = None,
+    symmetry: Sequence[str] = (),
 ) -> FitResult:
     """Fit H(f) = sum_i (f' A_i f)^p_i = 1 to loads and motions.
 
@@ -74,10 +78,11 @@ def fit_power_sum(
         velocity_weight: w; 0 is J1 of the thesis and 1 its J2.
         scaling: Characteristic length and friction force; chosen from the pairs if not given.
         search: Starts, seed, where and how to run.
+        symmetry: Axes "x", "y" about which the surface is to be its own mirror image.
 
     Raises:
         ShapeError: `exponents` is not a list of numbers.
-        RangeError: An exponent is outside (0, 1] or the weight negative.
+        RangeError: An exponent is outside (0, 1], the weight negative, or an axis not known.
         DataError: The pairs cannot determine such a surface.
         SolverError: No start led to a surface that passes through the loads.
     """
@@ -90,8 +95,9 @@ def fit_power_sum(
     if weight < 0.0:
         raise RangeError(f"velocity_weight must not be negative, got {weight}")
     scaled = scale_pairs(pairs, scaling)
-    check_support(scaled, PARAMETERS_PER_MATRIX * powers.size)
-    objective = PowerSumObjective(scaled, powers, weight)
+    images = images_of_terms(powers.size, symmetry, alike=bool(np.ptp(powers) == 0.0))
+    check_support(scaled, images.shape[1])
+    objective = symmetric(PowerSumObjective(scaled, powers, weight), images)
     name = "J1" if weight == 0.0 else f"J2, velocity weight {weight:g}"
     return solve(objective, name, pairs, search or Search())
 

@@ -85,6 +85,7 @@ FITS: dict[str, dict[str, object]] = {
     "polynomial": {"kind": "polynomial"},
     "convex": {"kind": "polynomial", "objective": "convex"},
     "second": {"kind": "power_sum", "objective": "second"},
+    "exact": {"kind": "exact"},
     "auto": {"auto": True},
 }
 # Those of them that a number of terms may follow.

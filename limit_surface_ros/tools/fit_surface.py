@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -130,6 +131,8 @@ def run(options: argparse.Namespace) -> None:
     command = shlex.join(["fit_surface", *options.command])
     write_surface_model(fitted.model, options.output, header=f"Made by: {command}")
     report(fitted, options.output)
+    for doubt in fitted.doubts:
+        warnings.warn(f"{options.input}: {doubt}", stacklevel=2)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -10,21 +10,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from limit_surface_ros import __version__
+from limit_surface_ros.checks import counted
 from limit_surface_ros.errors import DataError, RangeError
 from limit_surface_ros.files.bag_pushes import Selection
+from limit_surface_ros.files.body_file import read_body
+from limit_surface_ros.files.contact_file import read_contact
 from limit_surface_ros.files.surface_file import LARGEST_SCALE, SurfaceModel
 from limit_surface_ros.fitting.dissipation import FITTED_ON, fit_dissipation
 from limit_surface_ros.fitting.few_pushes.automatic import fit_automatically
 from limit_surface_ros.fitting.pairs import scaling_of_pairs
 from limit_surface_ros.fitting.polynomial import fit_polynomial
 from limit_surface_ros.fitting.power_sum import fit_power_sum
+from limit_surface_ros.fitting.result import FitResult, errors_on
 from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.second_approximation import fit_second_approximation
 from limit_surface_ros.surface.kinds.power_sum import thesis_exponents
+from limit_surface_ros.surface.scaling import Scaling
 from limit_surface_ros.tools.csv_options import add_cell_options, cell_options
 from limit_surface_ros.tools.options import check_ranges
 from limit_surface_ros.tools.training_data import (
     BAG,
+    BODY,
     CONTACT,
     Simulation,
     check_input,
@@ -40,11 +46,8 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
     from pathlib import Path
 
-    from limit_surface_ros.checks import Floats
-    from limit_surface_ros.fitting.result import FitResult
     from limit_surface_ros.fitting.search import Progress
     from limit_surface_ros.surface.kinds.point_contacts import PointContacts
-    from limit_surface_ros.surface.scaling import Scaling
     from limit_surface_ros.tools.training_data import TrainingData
 
 
@@ -53,6 +56,8 @@ RANGES = {
     "seed": (0, 2**63 - 1),
     "motions": (1, 1_000_000),
     "facet_loads": (0, 100_000),
+    "friction_coefficient": (1e-6, 1e6),
+    "normal_force": (1.0 / LARGEST_SCALE, LARGEST_SCALE),
     "load_noise": (0.0, 1e6),
     "motion_noise": (0.0, 1e6),
     "characteristic_length": (1.0 / LARGEST_SCALE, LARGEST_SCALE),
@@ -62,8 +67,14 @@ RANGES = {
     "folds": (2, 1000),
     "bootstrap": (0, 100_000),
 }
+VELOCITY_WEIGHT = 1.0
 # Frame of a model whose data state none.
 DEFAULT_FRAME = "object"
+# The kind that needs no fit.
+EXACT = "exact"
+# Terms where none are asked for, of a contact's dissipation and of all else: a patch is met within
+# a degree by six, and one of two axes of symmetry within as much.
+PATCH_TERMS, FEW_TERMS = 6, 3
 # What each kind can be fitted by, the default first.
 OBJECTIVES: dict[str, tuple[str, ...]] = {
     "power_sum": ("J2", "J1", "second"),
@@ -74,10 +85,17 @@ OBJECTIVES: dict[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class FittedModel:
-    """A model ready to be written, and what is known of its fit."""
+    """A model ready to be written, and what is known of its fit.
+
+    Attributes:
+        model: The model.
+        result: How it was fitted.
+        doubts: What of its data looks like a slip, sentences.
+    """
 
     model: SurfaceModel
     result: FitResult
+    doubts: tuple[str, ...] = ()
 
 
 def add_fit_options(parser: argparse.ArgumentParser) -> None:
@@ -88,17 +106,21 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
     fit = parser.add_argument_group("fit")
     fit.add_argument(
         "--kind",
-        choices=["power_sum", "dissipation", "polynomial"],
-        default="power_sum",
-        help="of surface; a polynomial is of fourth order (%(default)s)",
+        choices=[EXACT, *OBJECTIVES],
+        help="of surface; exact takes the support points as they are, a polynomial is of fourth "
+        "order; default: exact for a contact of points unless another option of the fit is given, "
+        "else dissipation for a contact, and power_sum for pushes",
     )
-    fit.add_argument("--terms", type=int, default=3, help="terms of the model (%(default)s)")
+    fit.add_argument(
+        "--terms",
+        type=int,
+        help="terms of the model; default: 6 of a dissipation of a contact, else 3",
+    )
     fit.add_argument(
         "--family",
-        choices=["thesis", "norms"],
-        default="thesis",
-        help="exponents of a power_sum: 1, (n-1)/n, ..., 1/n, or 1/2 for every term, which is "
-        "always convex (%(default)s)",
+        choices=["norms", "thesis"],
+        help="exponents of a power_sum: 1/2 for every term, which is always convex, or 1, "
+        "(n-1)/n, ..., 1/n, of which those below 1/2 may bend it inward (default norms)",
     )
     fit.add_argument(
         "--objective",
@@ -111,7 +133,7 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
     fit.add_argument(
         "--velocity-weight",
         type=float,
-        default=1.0,
+        default=VELOCITY_WEIGHT,
         metavar="W",
         help="weight of the motions, in all but J1, forces and least-squares (%(default)s)",
     )
@@ -170,6 +192,19 @@ def _add_data_options(data: argparse._ArgumentGroup) -> None:
         metavar="M",
         help="makes moments and rotations comparable [m]; default: what the data state, or the "
         "ratio of moments to forces in them",
+    )
+    data.add_argument("--link", help="link of a URDF or SDF that stands on the ground")
+    data.add_argument(
+        "--friction-coefficient",
+        type=float,
+        metavar="MU",
+        help="under the link; default: what the URDF or SDF states",
+    )
+    data.add_argument(
+        "--normal-force",
+        type=float,
+        metavar="N",
+        help="on the ground under the link [N]; default: the weight of its mass",
     )
     data.add_argument(
         "--motions", type=int, default=2000, help="random motions of a contact (%(default)s)"
@@ -258,7 +293,7 @@ def fit_model(
         normal_force=data.normal_force,
         fit=history(options, data, result),
     )
-    return FittedModel(model, result)
+    return FittedModel(model, result, data.doubts)
 
 
 def read_input(path: Path, options: argparse.Namespace) -> TrainingData:
@@ -275,7 +310,7 @@ def read_input(path: Path, options: argparse.Namespace) -> TrainingData:
         return training_data_of_bag(
             path, options.wrench_topic, options.motion_topic, Selection(**rules)
         )
-    if kind == CONTACT:
+    if kind in (CONTACT, BODY):
         simulation = Simulation(
             options.motions,
             options.facet_loads,
@@ -283,7 +318,12 @@ def read_input(path: Path, options: argparse.Namespace) -> TrainingData:
             options.motion_noise,
             options.seed,
         )
-        return training_data_of_contact(path, simulation, options.characteristic_length)
+        contact = (
+            read_contact(path)
+            if kind == CONTACT
+            else read_body(path, options.link, options.friction_coefficient, options.normal_force)
+        )
+        return training_data_of_contact(path, contact, simulation, options.characteristic_length)
     return training_data_of_pushes(path, options.rows, cell_options(options))
 
 
@@ -293,6 +333,9 @@ def fit(options: argparse.Namespace, data: TrainingData, search: Search) -> FitR
     if length is None:
         length = data.characteristic_length
     scaling = scaling_of_pairs(data.training, length)
+    if data.support is not None and not data.recorded:
+        # A contact states its friction force; the loads of pushes only hint at it.
+        scaling = Scaling(scaling.characteristic_length, data.support.scaling.friction_force)
     check_scaling(scaling)
     if options.auto:
         result = fit_automatically(
@@ -312,21 +355,29 @@ def fit_as_asked(
     options: argparse.Namespace, data: TrainingData, scaling: Scaling, search: Search
 ) -> FitResult:
     """Fit the kind and the objective that the options name."""
-    objective, weight = objective_of(options, data.recorded), float(options.velocity_weight)
-    pairs = data.training
-    if options.kind == "polynomial":
+    kind = kind_of(options, data.recorded, of_points=data.of_points)
+    pairs, weight, terms = data.training, options.velocity_weight, terms_of(options, kind, data)
+    if kind == EXACT:
+        return exact_model(data)
+    objective = objective_of(options, kind, data.recorded)
+    if kind == "polynomial":
         convex = objective == "convex"
         return fit_polynomial(
-            pairs, velocity_weight=weight if convex else 0.0, convex=convex, scaling=scaling
+            pairs,
+            velocity_weight=weight if convex else 0.0,
+            convex=convex,
+            scaling=scaling,
+            symmetry=data.symmetry,
         )
-    if options.kind == "dissipation":
+    if kind == "dissipation":
         return fit_dissipation(
             pairs,
-            options.terms,
+            terms,
             fitted_on=objective,
             velocity_weight=weight,
             scaling=scaling,
             search=search,
+            symmetry=data.symmetry,
         )
     if objective == "second":
         return fit_second_approximation(
@@ -334,40 +385,92 @@ def fit_as_asked(
         )
     return fit_power_sum(
         pairs,
-        exponents_of(options),
+        thesis_exponents(terms) if options.family == "thesis" else np.full(terms, 0.5),
         velocity_weight=0.0 if objective == "J1" else weight,
         scaling=scaling,
         search=search,
+        symmetry=data.symmetry,
     )
 
 
-def objective_of(options: argparse.Namespace, recorded: bool) -> str:
+def exact_model(data: TrainingData) -> FitResult:
+    """Return the contact's own support points as a result: nothing is fitted, the error is 0.
+
+    Raises:
+        RangeError: The data are recorded pushes.
+    """
+    if data.recorded or data.support is None:
+        raise RangeError("--kind exact is for contacts: pushes do not say where a body stands")
+    points = len(data.support.points)
+    what = counted(points, "support point" if data.of_points else "cell")
+    return FitResult(
+        surface=data.support,
+        objective=f"exact: the {what} of the contact",
+        cost=0.0,
+        start_costs=(0.0,),
+        iterations=0,
+        gradient_norm=0.0,
+        converged=True,
+        wall_time=0.0,
+        training=errors_on(data.support, data.training),
+    )
+
+
+def kind_of(options: argparse.Namespace, recorded: bool, *, of_points: bool) -> str:
+    """Return the kind of surface that the options ask for.
+
+    Args:
+        options: What is asked for.
+        recorded: Whether the data are recorded pushes.
+        of_points: Whether they are a contact of support points.
+    """
+    if options.kind is not None:
+        return str(options.kind)
+    if recorded or options.family is not None or options.objective in OBJECTIVES["power_sum"]:
+        return "power_sum"
+    return "dissipation" if not of_points or asks_for_a_fit(options) else EXACT
+
+
+def asks_for_a_fit(options: argparse.Namespace) -> bool:
+    """Tell whether an option is given that does nothing to an exact model."""
+    given = {"terms", "family", "objective", "load_noise", "motion_noise"}
+    changed = {"velocity_weight": VELOCITY_WEIGHT, "starts": Search.starts}
+    return any(getattr(options, name) for name in given) or any(
+        getattr(options, name) != default for name, default in changed.items()
+    )
+
+
+def terms_of(options: argparse.Namespace, kind: str, data: TrainingData) -> int:
+    """Return the number of terms, that of the options or the usual one of the kind."""
+    if options.terms is not None:
+        return int(options.terms)
+    if kind != "dissipation" or data.recorded:
+        return FEW_TERMS
+    points = len(data.support.points) if data.of_points and data.support else PATCH_TERMS
+    return min(points, PATCH_TERMS)
+
+
+def objective_of(options: argparse.Namespace, kind: str, recorded: bool) -> str:
     """Return the objective, by default the first of the kind's.
 
     Args:
         options: What is asked for.
+        kind: Of surface, not exact.
         recorded: Whether the data are recorded pushes and not a contact.
 
     Raises:
         RangeError: The objective is none of the kind's.
     """
-    accepted = OBJECTIVES[options.kind]
+    accepted = OBJECTIVES[kind]
     if options.objective is None:
-        on_pushes = options.kind == "dissipation" and recorded
+        on_pushes = kind == "dissipation" and recorded
         return "directions" if on_pushes else accepted[0]
     if options.objective not in accepted:
         raise RangeError(
-            f"--objective {options.objective} is not for --kind {options.kind}, "
+            f"--objective {options.objective} is not for --kind {kind}, "
             f"which takes {', '.join(accepted)}"
         )
     return str(options.objective)
-
-
-def exponents_of(options: argparse.Namespace) -> Floats:
-    """Return the exponents of the power sum that the options ask for."""
-    if options.family == "thesis":
-        return thesis_exponents(options.terms)
-    return np.full(max(options.terms, 0), 0.5)
 
 
 def support_of(options: argparse.Namespace, data: TrainingData) -> PointContacts | None:

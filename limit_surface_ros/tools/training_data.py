@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from limit_surface_ros.errors import DataError, FileError
 from limit_surface_ros.files.bag_pushes import Selection, read_bag_pushes
-from limit_surface_ros.files.contact_file import read_contact
+from limit_surface_ros.files.body_file import SUFFIXES as BODY_SUFFIXES
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.files.surface_file import LARGEST_SCALE
 from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
@@ -22,16 +22,21 @@ from limit_surface_ros.surface.scaling import Scaling
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from limit_surface_ros.files.contact_file import ContactModel
     from limit_surface_ros.files.csv_table import CsvOptions
     from limit_surface_ros.surface.pairs import Pairs
 
 # What an input can be, as messages call it.
 CONTACT, PUSHES, BAG = "a contact file", "a CSV of pushes", "a bag"
-SUFFIXES = (*YAML_SUFFIXES, ".csv")
+BODY = "a URDF or SDF"
+SUFFIXES = (*YAML_SUFFIXES, ".csv", *BODY_SUFFIXES)
 # Other ends of names that tables in text have.
 TABLE_SUFFIXES = (".csv", ".tsv", ".txt", ".dat")
 BAG_SUFFIXES = (".mcap", ".db3")
-ACCEPTED = "a contact file (.yaml, .yml), recorded pushes (.csv), or a ROS 2 bag"
+ACCEPTED = (
+    "a contact file (.yaml, .yml), a robot description (.urdf, .sdf), recorded pushes (.csv), or "
+    "a ROS 2 bag"
+)
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,9 @@ class TrainingData:
         frame_id: Frame of the pairs, if the source states it.
         reference_point: Of the contact that was simulated [m].
         recorded: Whether the pairs were measured and not simulated.
+        of_points: Whether `support` is the whole contact, and no patch cut into cells.
+        symmetry: Axes about which a model is to be symmetric.
+        doubts: What of the source looks like a slip, sentences.
         about: For the model file.
     """
 
@@ -60,6 +68,9 @@ class TrainingData:
     frame_id: str | None = None
     reference_point: tuple[float, float] = (0.0, 0.0)
     recorded: bool = False
+    of_points: bool = False
+    symmetry: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
     about: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -177,15 +188,13 @@ class Simulation:
 
 
 def training_data_of_contact(
-    path: Path, simulation: Simulation, characteristic_length: float | None
+    path: Path, contact: ContactModel, simulation: Simulation, characteristic_length: float | None
 ) -> TrainingData:
-    """Make pairs from a contact file, and as many fresh motions without noise to test on.
+    """Make pairs of a contact, and as many fresh motions without noise to test on.
 
     Raises:
-        FileError: The file is absent or no valid contact.
         DataError: The body is of no size that a model file takes.
     """
-    contact = read_contact(path)
     exact = contact.surface
     if characteristic_length is not None:
         scaling = Scaling(characteristic_length, exact.scaling.friction_force)
@@ -200,6 +209,7 @@ def training_data_of_contact(
         motion_noise=simulation.motion_noise,
         seed=simulation.seed,
     )
+    loads = {} if contact.load_method is None else {"loads_of_points": contact.load_method}
     x, y = (float(component) for component in contact.reference_point)
     return TrainingData(
         training=training,
@@ -210,7 +220,10 @@ def training_data_of_contact(
         name=contact.name,
         frame_id=contact.frame_id,
         reference_point=(x, y),
-        about={"data": path.name, **asdict(simulation)},
+        of_points=contact.of_points,
+        symmetry=contact.symmetry,
+        doubts=contact.doubts,
+        about={"data": path.name, **loads, **asdict(simulation)},
     )
 
 
@@ -233,7 +246,7 @@ def check_scaling(scaling: Scaling) -> None:
 
 
 def check_input(path: Path) -> str:
-    """Return what an input is, by its name: CONTACT, PUSHES or BAG.
+    """Return what an input is, by its name: CONTACT, BODY, PUSHES or BAG.
 
     Raises:
         FileError: There is no such file, or it is of no such kind.
@@ -257,9 +270,11 @@ def check_input(path: Path) -> str:
 
 
 def kind_of_input(path: Path) -> str:
-    """Return what an input that is there is, by its name: CONTACT, PUSHES or BAG."""
+    """Return what an input that is there is, by its name: CONTACT, BODY, PUSHES or BAG."""
     if is_bag(path):
         return BAG
+    if path.suffix.lower() in BODY_SUFFIXES:
+        return BODY
     return CONTACT if path.suffix.lower() in YAML_SUFFIXES else PUSHES
 
 

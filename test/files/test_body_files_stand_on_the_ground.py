@@ -186,7 +186,7 @@ def test_a_body_whose_mass_is_near_its_rim_lifts_the_other_side(tmp_path):
     shares = surface.friction_limits / surface.friction_limits.sum()
     np.testing.assert_allclose(shares @ surface.points, [0.08, 0.0], atol=1e-9)
     # A triangle of pressure of three times the distance to the rim, as of a spring under one edge.
-    assert surface.points[shares > 0.0, 0].min() == pytest.approx(0.1 - 3 * 0.02, abs=2e-3)
+    assert surface.points[shares > 0.0, 0].min() == pytest.approx(0.1 - 3 * 0.02, abs=5e-3)
 
 
 def test_an_area_and_a_point_at_a_time_are_left_to_a_contact_file(tmp_path):

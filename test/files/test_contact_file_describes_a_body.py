@@ -31,6 +31,85 @@ def test_support_points_may_state_the_weight_at_which_their_limits_hold(tmp_path
     assert read(tmp_path, limits + "normal_force: 12.0\n").normal_force == 12.0
 
 
+def test_feet_under_a_centre_of_mass_have_loads_by_statics(tmp_path):
+    model = read(
+        tmp_path,
+        POINTS + "friction_coefficient: 0.5\nnormal_force: 12.0\ncentre_of_mass: [0.15, 0.1]\n",
+    )
+    np.testing.assert_allclose(model.surface.friction_limits, [1.0, 3.0, 2.0])
+    assert (model.normal_force, model.load_method, model.of_points) == (12.0, "statics", True)
+
+
+def test_feet_may_state_their_loads(tmp_path):
+    model = read(tmp_path, POINTS + "friction_coefficient: 0.5\nloads: [1, 2, 3]\n")
+    np.testing.assert_allclose(model.surface.friction_limits, [0.5, 1.0, 1.5])
+    assert (model.normal_force, model.load_method) == (6.0, None)
+
+
+def test_four_feet_share_the_weight_as_springs_and_say_so(tmp_path):
+    four = POINTS.replace("[0, 0.3]]", "[0, 0.3], [0.3, 0.3]]")
+    body = four + "friction_coefficient: 0.5\nnormal_force: 8.0\ncentre_of_mass: [0.15, 0.15]\n"
+    model = read(tmp_path, body)
+    np.testing.assert_allclose(model.surface.friction_limits, [1.0] * 4)
+    assert "least norm" in model.load_method
+    stiff = read(tmp_path, body + "stiffnesses: [3, 1, 1, 3]\n")
+    np.testing.assert_allclose(stiff.surface.friction_limits, [1.5, 0.5, 0.5, 1.5])
+    assert "given stiffnesses" in stiff.load_method
+
+
+@pytest.mark.parametrize(
+    ("stated", "symmetry", "doubts"),
+    [
+        ("", ("x", "y"), 0),
+        ("symmetry: auto\n", ("x", "y"), 0),
+        ("symmetry: none\n", (), 0),
+        ("symmetry: [y]\n", ("y",), 0),
+    ],
+)
+def test_a_box_is_symmetric_unless_the_file_says_otherwise(tmp_path, stated, symmetry, doubts):
+    model = read(tmp_path, PATCH + "shape: {kind: rectangle, size: [0.12, 0.07]}\n" + stated)
+    assert model.symmetry == symmetry
+    assert len(model.doubts) == doubts
+
+
+def test_symmetry_that_the_contact_has_not_is_doubted(tmp_path):
+    turned = PATCH + "shape: {kind: rectangle, size: [0.12, 0.07], angle: 0.3}\n"
+    assert read(tmp_path, turned).symmetry == ()
+    model = read(tmp_path, turned + "symmetry: [x]\n")
+    assert model.symmetry == ("x",)
+    assert "not its own mirror image about the x axis" in model.doubts[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "doubt"),
+    [
+        (
+            PATCH + "shape: {kind: rectangle, size: [120, 70]}\n",
+            "37.1 m from the reference point: are the lengths in metres",
+        ),
+        (
+            PATCH.replace("0.5", "35") + "shape: {kind: disc, radius: 0.1}\n",
+            "friction coefficient of 35 is more than rubber has",
+        ),
+        (
+            PATCH + "shape: {kind: rectangle, size: [0.12, 0.07], angle: 45}\n",
+            "angle of 45 rad is more than a turn: is it in degrees",
+        ),
+        (
+            POINTS.replace("0.3", "300.0") + "friction_limits: [1, 1, 1]\n",
+            "are the lengths in metres",
+        ),
+    ],
+)
+def test_what_looks_like_other_units_is_doubted(tmp_path, text, doubt):
+    (found,) = read(tmp_path, text).doubts
+    assert doubt in found
+
+
+def test_an_ordinary_contact_is_not_doubted(tmp_path):
+    assert read(tmp_path, PATCH + "shape: {kind: disc, radius: 0.1, angle: 6}\n").doubts == ()
+
+
 def test_a_given_reference_point_is_kept(tmp_path):
     model = read(tmp_path, POINTS + "friction_limits: [1, 2, 3]\nreference_point: [0, 0.3]\n")
     np.testing.assert_allclose(model.surface.points[2], [0, 0])
@@ -81,6 +160,26 @@ def test_every_pressure_is_read(tmp_path, pressure):
         (
             PATCH.replace("200", "100000000") + "shape: {kind: disc, radius: 1}\n",
             "cells: must be a whole number from 1 to 1000000, got 100000000",
+        ),
+        (
+            POINTS + "friction_coefficient: 0.5\nnormal_force: 1.0\n",
+            "loads: missing; beside points and friction_coefficient stand either the loads",
+        ),
+        (
+            POINTS + "friction_coefficient: 0.5\nnormal_force: 1.0\ncentre_of_mass: [1, 1]\n",
+            "centre_of_mass: .*would tip over",
+        ),
+        (
+            PATCH + "symmetry: [z]\nshape: {kind: disc, radius: 1}\n",
+            "symmetry: must be auto, none, or a list of the axes x and y",
+        ),
+        (
+            PATCH + "shape: {kind: rectangle, size: [0.1, 1.0e+23]}\n",
+            "size must be from 1e-09 to",
+        ),
+        (
+            PATCH + "shape: {kind: rectangle, size: [1.0e-150, 0.2]}\npressure: {kind: rim}\n",
+            "size must be from 1e-09 to",
         ),
         (POINTS + "friction_limits: [1, 2]\n", "friction_limits: must be an array of 3"),
         (POINTS + "friction_limits: [0, 0, 0]\n", "friction_limits: .* above 0"),

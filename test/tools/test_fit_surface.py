@@ -99,7 +99,13 @@ friction_limits: [0.5, 0.5, 0.5]
 @pytest.mark.parametrize(
     ("options", "kind", "most_degrees"),
     [
-        (["--terms", "2", "--characteristic-length", "0.15"], "power_sum", 6.0),
+        (
+            ["--kind", "power_sum", "--terms", "2", "--characteristic-length", "0.15"],
+            "power_sum",
+            6.0,
+        ),
+        ([], "point_contacts", 1e-9),
+        (["--terms", "3"], "dissipation", 1e-3),
         (["--family", "norms", "--objective", "J1"], "power_sum", 9.0),
         (["--objective", "second"], "power_sum", 9.0),
         (["--kind", "polynomial"], "polynomial", 14.0),
@@ -339,3 +345,61 @@ def processor_ticks(group):
         if int(fields[2]) == group:
             ticks += int(fields[11]) + int(fields[12])
     return ticks
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("[0.12, 0.07]", "[120, 70]"), "are the lengths in metres?"),
+        (("0.35", "35"), "is it a percentage, or an angle?"),
+        (("0.07]", "0.07], angle: 45"), "is it in degrees?"),
+        (("0.35", "0.35"), ""),
+    ],
+)
+def test_a_contact_in_other_units_is_warned_about(tmp_path, capsys, recwarn, change, words):
+    text = (
+        "schema: 1\nname: box\nfriction_coefficient: 0.35\nnormal_force: 3.924\ncells: 100\n"
+        "shape: {kind: rectangle, size: [0.12, 0.07]}\n"
+    )
+    contact, output = tmp_path / "box.yaml", tmp_path / "model.yaml"
+    contact.write_text(text.replace(*change))
+    assert main([str(contact), "-o", str(output), "--motions", "100", "--terms", "1"]) == 0
+    errors = capsys.readouterr().err
+    assert words in errors
+    assert ("box.yaml" in errors) == bool(words)
+
+
+def test_a_stool_of_three_feet_becomes_its_exact_model(tmp_path):
+    contact, output = tmp_path / "stool.yaml", tmp_path / "model.yaml"
+    contact.write_text(
+        "schema: 1\nname: stool\npoints: [[0.16, 0.0], [-0.08, 0.13], [-0.07, -0.12]]\n"
+        "friction_limits: [3.4335, 5.15025, 8.58375]\n"
+    )
+    assert main([str(contact), "-o", str(output)]) == 0
+    model = read_surface_model(output)
+    assert model.surface.kind == "point_contacts"
+    assert model.fit["held_out"]["mean_angle_rad"] < 1e-9
+    assert model.surface.scaling.friction_force == pytest.approx(17.1675)
+
+
+def test_a_link_of_a_urdf_is_fitted(tmp_path, capsys):
+    robot, output = tmp_path / "robot.urdf", tmp_path / "model.yaml"
+    robot.write_text(
+        "<robot name='r'><link name='base'><inertial><mass value='0.4'/></inertial><collision>"
+        "<geometry><box size='0.12 0.07 0.05'/></geometry></collision></link></robot>"
+    )
+    arguments = [str(robot), "-o", str(output), "--motions", "300"]
+    assert main(arguments) == 2
+    assert "give --friction-coefficient" in capsys.readouterr().err
+    assert main([*arguments, "--link", "base", "--friction-coefficient", "0.35"]) == 0
+    model = read_surface_model(output)
+    assert (model.name, model.frame_id, model.surface.kind) == ("base", "base", "dissipation")
+    straight = model.surface.twist_of_wrench([1.0, 0.0, 0.0])
+    np.testing.assert_allclose(straight / model.surface.scaling.twist_unit, [1, 0, 0], atol=1e-9)
+    assert main([str(robot), "-o", str(output), "--rows", "1"]) == 2
+
+
+@pytest.mark.parametrize("option", ["--link", "--friction-coefficient", "--normal-force"])
+def test_options_of_links_are_refused_for_other_inputs(pushes, tmp_path, capsys, option):
+    assert main([str(pushes), "-o", str(tmp_path / "m.yaml"), option, "1"]) == 2
+    assert f"{option} does nothing here: it is for a URDF or SDF" in capsys.readouterr().err

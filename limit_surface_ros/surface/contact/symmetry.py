@@ -29,7 +29,8 @@ def mirror_axes(contacts: PointContacts) -> tuple[str, ...]:
         contacts: A body's contact; the mirrors pass its reference point.
 
     Returns:
-        Of "x" and "y" those about which the body is symmetric.
+        Of "x" and "y" those about which the body is symmetric, the one along which its friction
+        spreads more first.
     """
     twists = random_directions(_MOTIONS, 0) * contacts.scaling.twist_unit
     power = np.sum(contacts.wrench_of_twist(twists) * twists, axis=1)
@@ -39,4 +40,5 @@ def mirror_axes(contacts: PointContacts) -> tuple[str, ...]:
         mirrored = np.sum(contacts.wrench_of_twist(images) * images, axis=1)
         if (np.abs(mirrored - power) <= _ALIKE * power.max()).all():
             axes.append(axis)
-    return tuple(axes)
+    spread = dict(zip(MIRRORS, contacts.friction_limits @ contacts.points**2, strict=True))
+    return tuple(sorted(axes, key=lambda axis: -float(spread[axis])))
