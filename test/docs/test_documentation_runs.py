@@ -136,7 +136,7 @@ def environment(tmp_path):
 
 @pytest.fixture
 def own_files(tmp_path):
-    """The files that README takes the reader to have: a model, pushes, a contact."""
+    """The files that README takes the reader to have: a model, pushes, a contact, a robot."""
     folder = tmp_path / "work"
     folder.mkdir()
     feet = [[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]]
@@ -148,6 +148,10 @@ def own_files(tmp_path):
     np.savetxt(folder / "pushes.csv", rows, delimiter=",", header=heading, comments="")
     contact = f"schema: 1\nname: mine\npoints: {feet}\nfriction_limits: [1.0, 1.0, 1.0]\n"
     (folder / "contact.yaml").write_text(contact)
+    box = "<collision><geometry><box size='0.12 0.07 0.05'/></geometry></collision>"
+    base = f"<link name='base'><inertial><mass value='0.4'/></inertial>{box}</link>"
+    friction = "<gazebo reference='base'><mu1>0.35</mu1></gazebo>"
+    (folder / "robot.urdf").write_text(f"<robot name='box'>{base}{friction}</robot>")
     return folder
 
 
