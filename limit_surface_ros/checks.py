@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     Floats: TypeAlias = NDArray[np.float64]
+    Complexes: TypeAlias = NDArray[np.complex128]
     Bools: TypeAlias = NDArray[np.bool_]
     Places: TypeAlias = NDArray[np.intp]
 

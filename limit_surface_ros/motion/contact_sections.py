@@ -25,7 +25,7 @@ from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.linalg import root_of
 
 if TYPE_CHECKING:
-    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.checks import Complexes, Floats
     from limit_surface_ros.surface.base import LimitSurface
 
 
@@ -45,17 +45,17 @@ class PlaneSection(Protocol):
         """
         ...
 
-    def guess(self, contacts: Floats, u: Floats, w: Floats) -> Floats:
-        """Return angles (m,) near those of the forces that cause velocities along (u, w)."""
+    def guess(self, contacts: Floats, wanted: Floats) -> Floats:
+        """Return angles (m,) near those of the forces that cause velocities at given angles."""
         ...
 
-    def respond(self, contacts: Floats, c: Floats, s: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return the velocity that a force (c, s) of unit length causes, and how it turns.
+    def respond(self, contacts: Floats, angles: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return the velocity that a unit force at an angle causes, and how it turns.
 
         Returns:
-            A velocity (v_n, v_t) of any length along the outward normal of the section, and
-            h = (v x v') / (v.f), v' its derivative by the force's angle: the section's curvature
-            times the length of v.
+            The components of a velocity v of any length, along the force and to its left, and
+            h = (v x v') / (v.f), v' its derivative by the force's angle: the curvature of the
+            section times the length of v.
         """
         ...
 
@@ -82,8 +82,10 @@ def _(surface: Polynomial) -> PlaneSection:
 class _NormSection:
     """Of a sum of norms, sum_i |R_i f|.
 
-    With 2x2 roots L_i of the forms of forces, L_i' L_i = J A_i J', the velocity is the sum of
-    L_i' L_i f / |L_i f|, and h that of det(L_i)^2 / |L_i f|^3.
+    In the axes of the form S_i = J A_i J' of a term, with eigenvalues M and m, a force at the
+    angle d has f'S f = M cos(d)^2 + m sin(d)^2 =: q, and the velocity of that term is sqrt(q)
+    along the force and (m - M) sin(d) cos(d) / sqrt(q) to its left: no differences, so that a
+    term which hardly resists a force costs no digits. Its h is M m / q^(3/2).
     """
 
     def __init__(self, roots: Floats) -> None:
@@ -92,88 +94,77 @@ class _NormSection:
         self._terms = len(roots)
 
     def of_contacts(self, along: Floats, across: Floats) -> Floats:
-        """Return the elements (l11, l12, l21, l22) of each term, and its det(L)^2."""
+        """Return the angle of the first axis, M, m, m - M and M m of each term."""
         count = along.shape[1]
         n = (self._stacked @ along).reshape(-1, 3, count)
         t = (self._stacked @ across).reshape(-1, 3, count)
-        a, b, d = (np.einsum("kcm,kcm->km", *pair) for pair in ((n, n), (n, t), (t, t)))
-        # |n x t|^2 = a d - b^2, without the difference.
-        det = (
-            (n[:, 1] * t[:, 2] - n[:, 2] * t[:, 1]) ** 2
-            + (n[:, 2] * t[:, 0] - n[:, 0] * t[:, 2]) ** 2
-            + (n[:, 0] * t[:, 1] - n[:, 1] * t[:, 0]) ** 2
-        )
-        # Cholesky's root, pivoted: what it leaves to the second row is small and exact.
-        upper = a >= d
-        pivot = np.sqrt(np.where(upper, a, d))
-        safe = np.where(pivot > 0.0, pivot, 1.0)
-        beside, rest = b / safe, np.sqrt(det) / safe
+        b = 2.0 * np.einsum("kcm,kcm->km", n, t)
+        n_n, t_t = np.einsum("kcm,kcm->km", n, n), np.einsum("kcm,kcm->km", t, t)
+        c = n_n - t_t
+        # |n x t|^2 is the form's determinant, without a difference of squares.
+        x = n[:, 1] * t[:, 2] - n[:, 2] * t[:, 1]
+        y = n[:, 2] * t[:, 0] - n[:, 0] * t[:, 2]
+        z = n[:, 0] * t[:, 1] - n[:, 1] * t[:, 0]
+        determinant = x * x + y * y + z * z
+        largest = 0.5 * (n_n + t_t + np.sqrt(b * b + c * c))
+        least = determinant / np.maximum(largest, 1e-300)
         return np.concatenate(
-            [
-                np.where(upper, pivot, beside),
-                np.where(upper, beside, pivot),
-                np.where(upper, 0.0, rest),
-                np.where(upper, rest, 0.0),
-                det,
-            ]
+            [0.5 * np.arctan2(b, c), largest, least, least - largest, determinant]
         )
 
-    def guess(self, contacts: Floats, u: Floats, w: Floats) -> Floats:
+    def guess(self, contacts: Floats, wanted: Floats) -> Floats:
         """Return the answer for the ellipsoid of the terms' sum."""
-        l11, l12, l21, l22, _ = contacts.reshape(5, self._terms, -1)
-        a = np.add.reduce(l11 * l11 + l21 * l21)
-        b = np.add.reduce(l11 * l12 + l21 * l22)
-        d = np.add.reduce(l12 * l12 + l22 * l22)
-        return np.asarray(np.arctan2(a * w - b * u, d * u - b * w))
+        axis, largest, least, less, _ = contacts.reshape(5, self._terms, -1)
+        total = np.add.reduce(largest + least)
+        turned = -np.add.reduce(less * np.exp(2j * axis))
+        # (S^-1 u) of S = (total + turned conj) / 2, up to its length.
+        u = np.exp(1j * wanted)
+        return np.asarray(np.angle(total * u - turned * np.conj(u)))
 
-    def respond(self, contacts: Floats, c: Floats, s: Floats) -> tuple[Floats, Floats, Floats]:
+    def respond(self, contacts: Floats, angles: Floats) -> tuple[Floats, Floats, Floats]:
         """See `PlaneSection`."""
-        l11, l12, l21, l22, det = contacts.reshape(5, self._terms, -1)
-        x = l11 * c + l12 * s
-        y = l21 * c + l22 * s
-        square = x * x + y * y
-        if not square.all():
+        axis, largest, least, less, determinant = contacts.reshape(5, self._terms, -1)
+        turn = angles - axis
+        c, s = np.cos(turn), np.sin(turn)
+        square = largest * (c * c)
+        square += least * (s * s)
+        norm = np.sqrt(square)
+        along = np.add.reduce(norm)
+        if not norm.all():
             # A term that does not resist a force adds nothing to its velocity.
-            square[square == 0.0] = np.inf
-        inverse = 1.0 / np.sqrt(square)
-        x *= inverse
-        y *= inverse
-        v_n = np.add.reduce(l11 * x + l21 * y)
-        v_t = np.add.reduce(l12 * x + l22 * y)
-        inverse *= det
-        inverse /= square
-        return v_n, v_t, np.add.reduce(inverse)
+            norm[norm == 0.0] = square[square == 0.0] = np.inf
+        c *= s
+        c *= less
+        c /= norm
+        norm *= square
+        return along, np.add.reduce(c), np.add.reduce(determinant / norm)
 
 
 class _PowerSection(_NormSection):
-    """Of a sum of powers, whose terms weigh w_i instead of 1 / |L_i f|."""
+    """Of a sum of powers, whose terms weigh w_i instead of 1 / |R_i f|."""
 
     def __init__(self, roots: Floats, exponents: Floats) -> None:
         """Keep R_i, shape (k, 3, 3), and p_i, shape (k,)."""
         super().__init__(roots)
-        self._exponents = exponents[:, np.newaxis]
+        self._exponents = 2.0 * exponents[:, np.newaxis]
         self._scale = power_scale(exponents)
 
-    def respond(self, contacts: Floats, c: Floats, s: Floats) -> tuple[Floats, Floats, Floats]:
+    def respond(self, contacts: Floats, angles: Floats) -> tuple[Floats, Floats, Floats]:
         """See `PlaneSection`; the weights' own change turns the velocity too."""
-        l11, l12, l21, l22, _ = contacts.reshape(5, self._terms, -1)
-        x = l11 * c + l12 * s
-        y = l21 * c + l22 * s
-        square = x * x + y * y
+        axis, largest, least, less, _ = contacts.reshape(5, self._terms, -1)
+        turn = angles - axis
+        c, s = np.cos(turn), np.sin(turn)
+        # The forms f'S f, t'S f and t'S t, t to the left of f.
+        square = largest * c * c + least * s * s
+        mixed, beside = less * s * c, largest * s * s + least * c * c
         _, weights = self._scale.load_factors_and_weights(square.copy())
+        along, across = np.add.reduce(weights * square), np.add.reduce(weights * mixed)
         square[square == 0.0] = np.inf
-        # Each term's own velocity q, and its derivative by the force's angle.
-        q_n, q_t = l11 * x + l21 * y, l12 * x + l22 * y
-        x, y = l12 * c - l11 * s, l22 * c - l21 * s
-        r_n, r_t = l11 * x + l21 * y, l12 * x + l22 * y
-        v_n, v_t = np.add.reduce(weights * q_n), np.add.reduce(weights * q_t)
-        power = v_n * c + v_t * s
-        # d log w_i = (2 p_i - 2) (q_i.t) / (q_i.f) - 2 p_i (v.t) / (v.f), up to what is common.
-        own = (2.0 * self._exponents - 2.0) * (q_t * c - q_n * s) / square
-        own -= 2.0 * self._exponents * ((v_t * c - v_n * s) / power)
-        turned_n = np.add.reduce(weights * (r_n + own * q_n))
-        turned_t = np.add.reduce(weights * (r_t + own * q_t))
-        return v_n, v_t, (v_n * turned_t - v_t * turned_n) / power
+        # d log w_i, up to what is common to all.
+        own = (self._exponents - 2.0) * mixed / square - self._exponents * (across / along)
+        turned_along = np.add.reduce(weights * (mixed + own * square))
+        turned_across = np.add.reduce(weights * (beside + own * mixed))
+        return along, across, turned_across - across / along * turned_along
 
 
 class _QuarticSection:
@@ -195,13 +186,15 @@ class _QuarticSection:
         both = 0.5 * (value((along + across).T) + value((along - across).T))
         return np.array([ends[0], sides[0], both - ends[0] - ends[1], sides[1], ends[1]])
 
-    def guess(self, contacts: Floats, u: Floats, w: Floats) -> Floats:
+    def guess(self, contacts: Floats, wanted: Floats) -> Floats:
         """Return the answer for the ellipse through the axes' ends."""
-        return np.asarray(np.arctan2(w / np.sqrt(contacts[4]), u / np.sqrt(contacts[0])))
+        n, t = np.sqrt(contacts[0]), np.sqrt(contacts[4])
+        return np.asarray(np.arctan2(np.sin(wanted) * n, np.cos(wanted) * t))
 
-    def respond(self, contacts: Floats, c: Floats, s: Floats) -> tuple[Floats, Floats, Floats]:
+    def respond(self, contacts: Floats, angles: Floats) -> tuple[Floats, Floats, Floats]:
         """See `PlaneSection`."""
         e0, e1, e2, e3, e4 = contacts
+        c, s = np.cos(angles), np.sin(angles)
         cc, cs, ss = c * c, c * s, s * s
         v_n = 4.0 * e0 * cc * c + 3.0 * e1 * cc * s + 2.0 * e2 * c * ss + e3 * ss * s
         v_t = e1 * cc * c + 2.0 * e2 * cc * s + 3.0 * e3 * c * ss + 4.0 * e4 * ss * s
@@ -209,7 +202,8 @@ class _QuarticSection:
         nt = 3.0 * e1 * cc + 4.0 * e2 * cs + 3.0 * e3 * ss
         tt = 2.0 * e2 * cc + 6.0 * e3 * cs + 12.0 * e4 * ss
         turned_n, turned_t = nt * c - nn * s, tt * c - nt * s
-        return v_n, v_t, (v_n * turned_t - v_t * turned_n) / (v_n * c + v_t * s)
+        along = v_n * c + v_t * s
+        return along, v_t * c - v_n * s, (v_n * turned_t - v_t * turned_n) / along
 
 
 class _AnySection:
@@ -224,25 +218,25 @@ class _AnySection:
         """Return both wrenches, shape (6, m)."""
         return np.concatenate([along, across])
 
-    def guess(self, contacts: Floats, u: Floats, w: Floats) -> Floats:
+    def guess(self, contacts: Floats, wanted: Floats) -> Floats:
         """Return the answer for a body that follows a force."""
-        return np.arctan2(w, u)
+        return wanted
 
-    def respond(self, contacts: Floats, c: Floats, s: Floats) -> tuple[Floats, Floats, Floats]:
+    def respond(self, contacts: Floats, angles: Floats) -> tuple[Floats, Floats, Floats]:
         """See `PlaneSection`."""
-        v_n, v_t = self._velocity(contacts, c, s)
-        before, after = (self._velocity(contacts, c - d * s, s + d * c) for d in (-_STEP, _STEP))
-        turned = np.arctan2(
-            before[0] * after[1] - before[1] * after[0],
-            before[0] * after[0] + before[1] * after[1],
+        before, here, after = (
+            self._velocity(contacts, angles + step) for step in (-_STEP, 0.0, _STEP)
         )
-        return v_n, v_t, turned / (2.0 * _STEP) * (v_n**2 + v_t**2) / (v_n * c + v_t * s)
+        turned = np.angle(np.conj(before) * after) / (2.0 * _STEP)
+        v = np.conj(np.exp(1j * angles)) * here
+        return v.real, v.imag, turned * np.abs(v) ** 2 / v.real
 
-    def _velocity(self, contacts: Floats, c: Floats, s: Floats) -> tuple[Floats, Floats]:
+    def _velocity(self, contacts: Floats, angles: Floats) -> Complexes:
         along, across = contacts[:3], contacts[3:]
-        twists = self._surface.twist_of_wrench(((along * c + across * s) * self._unit).T)
+        loads = along * np.cos(angles) + across * np.sin(angles)
+        twists = self._surface.twist_of_wrench((loads * self._unit).T)
         scaled = (twists / self._surface.scaling.twist_unit).T
-        return (along * scaled).sum(axis=0), (across * scaled).sum(axis=0)
+        return np.asarray((along * scaled).sum(axis=0) + 1j * (across * scaled).sum(axis=0))
 
 
 class LineSection:

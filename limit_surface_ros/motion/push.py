@@ -21,10 +21,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.checks import as_floats
-from limit_surface_ros.errors import RangeError, ShapeError, ZeroVectorError
+from limit_surface_ros.errors import ShapeError
 from limit_surface_ros.motion.outcomes import MODES, ContactMode, MotionCone, Push, Pushes
 from limit_surface_ros.motion.push_batch import Contacts, PushBatch
+from limit_surface_ros.motion.push_checks import as_complex, friction_edges, pairs, unit_normals
 from limit_surface_ros.motion.push_roots import SEPARATE
 from limit_surface_ros.motion.push_scalar import ContactScalar, pair, product
 from limit_surface_ros.surface.kinds.dissipation_surface import DissipationSurface
@@ -32,7 +32,6 @@ from limit_surface_ros.surface.kinds.dissipation_surface import DissipationSurfa
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from limit_surface_ros.checks import Floats
     from limit_surface_ros.surface.base import LimitSurface
 
 __all__ = ["MODES", "ContactMode", "MotionCone", "Push", "Pushes", "motion_cone", "push", "pushes"]
@@ -144,7 +143,7 @@ def pushes(
         array([0])
     """
     place, normal, moved = (
-        _pairs(name, values)
+        pairs(name, values)
         for name, values in (("points", points), ("normals", normals), ("velocities", velocities))
     )
     if not len(place) == len(normal) == len(moved):
@@ -152,58 +151,17 @@ def pushes(
             "points, normals and velocities must be as many, "
             f"got {len(place)}, {len(normal)} and {len(moved)}"
         )
-    inward = unit_normals(normal)
+    inward, moving = as_complex(unit_normals(normal)), as_complex(moved)
     edges = friction_edges(friction, len(place))
     twists, wrenches = np.zeros((len(place), 3)), np.zeros((len(place), 3))
     modes = np.full(len(place), SEPARATE)
-    rows = np.flatnonzero((inward * moved).sum(axis=1) > 0.0)
+    rows = np.flatnonzero((np.conj(inward) * moving).real > 0.0)
     if not len(rows):
         return Pushes(twists, modes, wrenches)
-    speeds = np.hypot(*moved[rows].T)[:, np.newaxis]
-    contacts = Contacts(place[rows], inward[rows], edges[rows], moved[rows] / speeds)
+    speeds = np.abs(moving[rows])
+    contacts = Contacts(as_complex(place)[rows], inward[rows], edges[rows], moving[rows] / speeds)
     found = PushBatch(surface).solve(contacts)
     assert found.wrenches is not None
-    twists[rows], modes[rows], wrenches[rows] = speeds * found.twists, found.modes, found.wrenches
+    twists[rows] = speeds[:, np.newaxis] * found.twists
+    modes[rows], wrenches[rows] = found.modes, found.wrenches
     return Pushes(twists, modes, wrenches)
-
-
-def friction_edges(friction: ArrayLike, count: int) -> Floats:
-    """Return cos and sin of the friction angles, shape (count, 2), of coefficients from 0 on.
-
-    Raises:
-        ShapeError: There are neither one nor `count` coefficients.
-        RangeError: A coefficient is negative or NaN.
-    """
-    try:
-        given = np.asarray(friction, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ShapeError("friction must be a number, or one for each push") from None
-    if given.shape not in ((), (count,)):
-        raise ShapeError(f"friction must be one number or {count}, got shape {given.shape}")
-    if not (given >= 0.0).all():
-        wrong = given[~(given >= 0.0)].ravel()[0]
-        raise RangeError(f"friction must be 0 or above, up to infinity, got {wrong}")
-    along = 1.0 / np.hypot(1.0, given)
-    across = np.where(np.isfinite(given), np.where(np.isfinite(given), given, 0.0) * along, 1.0)
-    return np.stack([np.broadcast_to(each, (count,)) for each in (along, across)], axis=1)
-
-
-def unit_normals(normals: Floats) -> Floats:
-    """Return normals (n, 2) of length one.
-
-    Raises:
-        ZeroVectorError: A normal is zero; the error gives the first one's place.
-    """
-    size = np.abs(normals).max(axis=1, initial=0.0)
-    if not size.all():
-        place = int(np.flatnonzero(size == 0.0)[0])
-        raise ZeroVectorError(f"normals must not be zero: no direction at index {place}")
-    scaled = normals / size[:, np.newaxis]
-    return np.asarray(scaled / np.hypot(*scaled.T)[:, np.newaxis])
-
-
-def _pairs(name: str, values: ArrayLike) -> Floats:
-    array = as_floats(name, values)
-    if array.ndim != 2 or array.shape[1] != 2:
-        raise ShapeError(f"{name} must have shape (n, 2), got {array.shape}")
-    return array

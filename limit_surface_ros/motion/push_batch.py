@@ -2,7 +2,9 @@
 """Many pushes at once: the force within the friction cone, or the edge along which it slides.
 
 With the load factor in closed form the force's angle is looked for, with the dissipation in closed
-form the turning rate; see `push_roots`. The surface's own maps then give the motions.
+form the turning rate; see `push_roots`. The surface's own maps then give the motions. Vectors of
+the plane are complex numbers here: a product with a unit one turns, conj(a) b holds the scalar
+product and the cross product.
 """
 
 from __future__ import annotations
@@ -23,37 +25,37 @@ from limit_surface_ros.motion.push_roots import (
 from limit_surface_ros.surface.kinds.dissipation_surface import DissipationSurface
 
 if TYPE_CHECKING:
-    from limit_surface_ros.checks import Bools, Floats, Places
+    from limit_surface_ros.checks import Bools, Complexes, Floats, Places
     from limit_surface_ros.surface.base import LimitSurface
 
-
 # Angle [rad] beyond which two ways to compute one wrench agree on the side of a corner.
 _ROUNDING = 2e-15
-# Angle [rad] beyond which two ways to compute one wrench agree on the side of a corner.
-_ROUNDING = 2e-15
+# The side to which pushers of each mode slide.
+_SIDES = np.array([0.0, 1.0, -1.0, 0.0])
 
 
 class Contacts(NamedTuple):
-    """Pushes whose pusher approaches: one row each.
+    """Pushes whose pusher approaches, one each, shape (m,).
 
     Attributes:
-        points: About the reference point [m], shape (m, 2).
-        normals: Unit, inward, shape (m, 2).
-        edges: cos and sin of the friction angle, shape (m, 2).
-        velocities: Unit, shape (m, 2), with a component along the normal above 0.
+        points: About the reference point [m].
+        normals: Unit, inward.
+        edges: Unit forces at the left edges of the friction cones, of which the normal is 1.
+        velocities: Unit, with a component along the normal above 0.
     """
 
-    points: Floats
-    normals: Floats
-    edges: Floats
-    velocities: Floats
+    points: Complexes
+    normals: Complexes
+    edges: Complexes
+    velocities: Complexes
 
-    def wrenches(self, along: Floats, across: Floats) -> Floats:
-        """Return wrenches (m, 3) of forces along the normal and to its left."""
-        nx, ny = self.normals.T
-        fx, fy = along * nx - across * ny, along * ny + across * nx
-        x, y = self.points.T
-        return np.stack([fx, fy, x * fy - y * fx], axis=1)
+    def wrenches(self, forces: Complexes) -> Floats:
+        """Return wrenches (m, 3) of forces, given from the normals."""
+        turned = self.normals * forces
+        loads = np.empty((len(turned), 3))
+        loads[:, 0], loads[:, 1] = turned.real, turned.imag
+        loads[:, 2] = (np.conj(self.points) * turned).imag
+        return loads
 
     def take(self, rows: Places | Bools) -> Contacts:
         """Return some of the pushes."""
@@ -78,6 +80,7 @@ class PushBatch:
     def __init__(self, surface: LimitSurface) -> None:
         """Prepare what all pushes share."""
         self._surface = surface
+        self._length = surface.scaling.characteristic_length
         self._section: PlaneSection | LineSection
         if isinstance(surface, DissipationSurface):
             self._section = LineSection(surface)
@@ -112,18 +115,21 @@ class PushBatch:
         exact: float,
         wrenches: bool,
     ) -> Answers:
-        nx, ny = contacts.normals.T
-        ux, uy = contacts.velocities.T
-        u, w = ux * nx + uy * ny, uy * nx - ux * ny
-        zero, one = np.zeros_like(u), np.ones_like(u)
-        unit = self._surface.scaling.wrench_unit / self._surface.scaling.friction_force
-        along = (contacts.wrenches(one, zero) / unit).T
-        across = (contacts.wrenches(zero, one) / unit).T
+        n = contacts.normals
+        arm = np.conj(contacts.points) * (n / self._length)
+        along = np.array([n.real, n.imag, arm.imag])
+        across = np.array([-n.imag, n.real, arm.real])
         data = section.of_contacts(along, across)
-        first = section.guess(data, u, w)
-        if starts is not None:
-            first = np.where(np.isfinite(starts), starts, first)
-        low, high, modes = force_angles(section, data, contacts.edges, u, w, first, exact)
+        wanted = np.angle(np.conj(n) * contacts.velocities)
+        if starts is None:
+            first = section.guess(data, wanted)
+        else:
+            first = starts
+            new = np.isnan(starts)
+            if new.any():
+                first = np.where(new, section.guess(data, wanted), starts)
+        limit = np.angle(contacts.edges)
+        low, high, modes = force_angles(section, data, limit, wanted, first, exact)
         jumps = np.flatnonzero(low < high)
         if len(jumps):
             # The surface's own map rounds otherwise: both sides of a corner must be met.
@@ -131,8 +137,8 @@ class PushBatch:
             high[jumps] += _ROUNDING
         twists, loads = self._caused(contacts, low, modes, wrenches)
         if len(jumps):
-            some, picked = contacts.take(jumps), modes[jumps]
-            more, more_loads = self._caused(some, high[jumps], picked, wrenches)
+            some = contacts.take(jumps)
+            more, more_loads = self._caused(some, high[jumps], modes[jumps], wrenches)
             _mix(some, twists, loads, jumps, more, more_loads)
         _follow(contacts, twists, modes)
         return Answers(twists, modes, loads, low)
@@ -141,10 +147,12 @@ class PushBatch:
         self, contacts: Contacts, angles: Floats, modes: Places, wrenches: bool
     ) -> tuple[Floats, Floats | None]:
         """Return the unit twists and the wrenches that forces at angles cause."""
-        side = _SIDES[modes]
-        c = np.where(side == 0.0, np.cos(angles), contacts.edges[:, 0])
-        s = np.where(side == 0.0, np.sin(angles), side * contacts.edges[:, 1])
-        return self._motions(contacts.wrenches(c, s), wrenches)
+        forces = np.exp(1j * angles)
+        slides = np.flatnonzero(modes != STICK)
+        if len(slides):
+            edges = contacts.edges[slides]
+            forces[slides] = edges.real + 1j * _SIDES[modes[slides]] * edges.imag
+        return self._motions(contacts.wrenches(forces), wrenches)
 
     def _motions(self, loads: Floats, wrenches: bool) -> tuple[Floats, Floats | None]:
         """Return the twists that wrenches (m, 3) cause, and the same wrenches on the surface."""
@@ -166,76 +174,70 @@ class PushBatch:
         exact: float,
         wrenches: bool,
     ) -> Answers:
-        length = self._surface.scaling.characteristic_length
-        x, y = contacts.points.T / length
-        ux, uy = contacts.velocities.T
-        zero, one = np.zeros_like(x), np.ones_like(x)
-        motion, turn = np.array([ux, uy, zero]), np.array([y, -x, one])
+        p, u = contacts.points / self._length, contacts.velocities
+        one = np.ones(len(p))
+        motion, turn = np.array([u.real, u.imag, 0.0 * one]), np.array([p.imag, -p.real, one])
         lines = section.of_lines(motion, turn)
         low, high = turning_rates(section, lines, starts, exact)
         twists, loads = self._turned(motion, turn, low)
         jumps = np.flatnonzero(low < high)
-        rates = low.copy()
+        rates = low
         if len(jumps):
             # Support points stand still in between: their loads fill the range without a moment.
             _, more = self._turned(motion[:, jumps], turn[:, jumps], high[jumps])
-            px, py = contacts.points[jumps].T
-            below, above = (w[:, 2] - px * w[:, 1] + py * w[:, 0] for w in (loads[jumps], more))
+            below, above = (_moments(contacts.points[jumps], w) for w in (loads[jumps], more))
             crossed = below < above
             share = np.where(crossed, below / np.where(crossed, below - above, 1.0), 0.5)
             share = np.clip(share, 0.0, 1.0)
+            rates = low.copy()
             rates[jumps] += share * (high[jumps] - low[jumps])
             loads[jumps] += share[:, np.newaxis] * (more - loads[jumps])
             twists[jumps] = self._line_twists(motion[:, jumps], turn[:, jumps], rates[jumps])
-        nx, ny = contacts.normals.T
-        f_n, f_t = loads[:, 0] * nx + loads[:, 1] * ny, loads[:, 1] * nx - loads[:, 0] * ny
-        beyond = np.abs(f_t) * contacts.edges[:, 0] > f_n * contacts.edges[:, 1]
-        modes = np.where(beyond, np.where(f_t > 0.0, SLIDE_LEFT, SLIDE_RIGHT), STICK)
+        force = np.conj(contacts.normals) * (loads[:, 0] + 1j * loads[:, 1])
+        edges = contacts.edges
+        beyond = np.abs(force.imag) * edges.real > force.real * edges.imag
+        modes = np.where(beyond, np.where(force.imag > 0.0, SLIDE_LEFT, SLIDE_RIGHT), STICK)
         slides = np.flatnonzero(beyond)
         if len(slides):
             some, picked = contacts.take(slides), modes[slides]
-            side = _SIDES[picked]
-            edge = some.wrenches(some.edges[:, 0], side * some.edges[:, 1])
-            twists[slides], edge_loads = self._motions(edge, wrenches)
-            if edge_loads is not None:
-                loads[slides] = edge_loads
-            moved = twists[slides]
+            moved, edge_loads = self._caused(some, np.zeros(len(slides)), picked, wrenches)
             _follow(some, moved, picked)
             twists[slides] = moved
+            if edge_loads is not None:
+                loads[slides] = edge_loads
         return Answers(twists, modes, loads if wrenches else None, rates)
 
     def _line_twists(self, motion: Floats, turn: Floats, rates: Floats) -> Floats:
         """Return physical twists V_0 + w d (m, 3); the rate is in scaled variables."""
         twists = motion + rates * turn
-        twists[2] /= self._surface.scaling.characteristic_length
+        twists[2] /= self._length
         return np.ascontiguousarray(twists.T)
 
     def _turned(self, motion: Floats, turn: Floats, rates: Floats) -> tuple[Floats, Floats]:
         twists = self._line_twists(motion, turn, rates)
-        # A pusher at a support point may find a motion that nothing resists, a zero twist never.
         return twists, self._surface.wrench_of_twist(twists)
 
 
-_SIDES = np.array([0.0, 1.0, -1.0, 0.0])
+def _moments(points: Complexes, wrenches: Floats) -> Floats:
+    """Return the moments (m,) of wrenches (m, 3) about points."""
+    force = wrenches[:, 0] + 1j * wrenches[:, 1]
+    return np.asarray(wrenches[:, 2] - (np.conj(points) * force).imag)
 
 
-def contact_velocities(points: Floats, twists: Floats) -> tuple[Floats, Floats]:
-    """Return the velocities (vx, vy) [m/s] at points (m, 2) of bodies with twists (m, 3)."""
-    vx, vy, omega = twists.T
-    return vx - omega * points[:, 1], vy + omega * points[:, 0]
+def contact_velocities(points: Complexes, twists: Floats) -> Complexes:
+    """Return the velocities (m,) [m/s] at points of bodies with twists (m, 3)."""
+    velocities = (1j * twists[:, 2]) * points
+    velocities.real += twists[:, 0]
+    velocities.imag += twists[:, 1]
+    return velocities
 
 
 def _follow(contacts: Contacts, twists: Floats, modes: Places) -> None:
     """Scale twists so that the contact keeps up with a pusher of unit velocity."""
-    vx, vy = contact_velocities(contacts.points, twists)
-    ux, uy = contacts.velocities.T
-    nx, ny = contacts.normals.T
-    stick = modes == STICK
-    speed = np.where(
-        stick,
-        (ux * vx + uy * vy) / np.where(stick, vx * vx + vy * vy, 1.0),
-        (ux * nx + uy * ny) / np.where(stick, 1.0, vx * nx + vy * ny),
-    )
+    moved, u = contact_velocities(contacts.points, twists), contacts.velocities
+    # Along the pusher's velocity if it sticks, along the normal if it slides.
+    along = np.where(modes == STICK, moved, contacts.normals)
+    speed = (np.conj(along) * u).real / (np.conj(along) * moved).real
     twists *= speed[:, np.newaxis]
 
 
@@ -251,16 +253,14 @@ def _mix(
 
     At a corner of the surface one load has a cone of motions; the two are at its sides.
     """
-    ux, uy = contacts.velocities.T
     lower, upper = (contact_velocities(contacts.points, each) for each in (twists[rows], more))
-    shares = []
-    for (vx, vy), sign in ((upper, 1.0), (lower, -1.0)):
-        turned = sign * (ux * vy - uy * vx) / np.hypot(vx, vy)
-        shares.append(np.maximum(turned, 0.0))
-    none = shares[0] + shares[1] == 0.0
     # Unit velocities weigh as the sines, whichever the lengths of the motions.
-    low = np.where(none, 1.0, shares[0]) / np.hypot(*lower)
-    high = shares[1] / np.hypot(*upper)
+    first, second = (
+        np.maximum(sign * (np.conj(contacts.velocities) * each).imag / np.abs(each), 0.0)
+        for each, sign in ((upper, 1.0), (lower, -1.0))
+    )
+    low = np.where(first + second == 0.0, 1.0, first) / np.abs(lower)
+    high = second / np.abs(upper)
     twists[rows] = low[:, np.newaxis] * twists[rows] + high[:, np.newaxis] * more
     if loads is not None and more_loads is not None:
         part = (high / (low + high))[:, np.newaxis]

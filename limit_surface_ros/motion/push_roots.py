@@ -34,85 +34,74 @@ _COMPRESS = 0.75
 def force_angles(
     section: PlaneSection,
     data: Floats,
-    edges: Floats,
-    u: Floats,
-    w: Floats,
+    limit: Floats,
+    wanted: Floats,
     first: Floats,
     exact: float,
 ) -> tuple[Floats, Floats, Places]:
-    """Return brackets of the angles of the forces, low and high, and modes, each (m,)."""
-    count = len(u)
-    lows, highs = np.empty(count), np.empty(count)
-    modes = np.full(count, STICK)
-    limit = np.arctan2(edges[:, 1], edges[:, 0])
-    wanted = np.arctan2(w, u)
+    """Return brackets of the angles of the forces, low and high, and modes, each (m,).
+
+    Args:
+        section: Of the surface.
+        data: Of the contacts, as the section gives it.
+        limit: Friction angles [rad], shape (m,).
+        wanted: Angles of the pushers' velocities, shape (m,).
+        first: Angles to begin with, shape (m,).
+        exact: Error of an angle of a velocity that counts as none.
+    """
+    count = len(limit)
+    lows, highs, modes = np.empty(count), np.empty(count), np.full(count, STICK)
     rows = np.arange(count)
-    low, high = -limit, limit.copy()
-    # Whether an end of the bracket has been tried: only then it is known to bracket.
-    low_known, high_known = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
-    b = np.clip(first, low, high)
-    width = np.full(count, np.inf)
     running = np.ones(count, dtype=bool)
-    cos, sin = edges[:, 0], edges[:, 1]
+    # What is proven: an end of the friction cone is none before it has been tried.
+    low, high = np.full(count, -np.inf), np.full(count, np.inf)
+    width = high
+    b = np.clip(first, -limit, limit)
     for step in range(1, _MAX_ROUNDS + 1):
-        at_low, at_high = b <= -limit, b >= limit
-        c, s = np.cos(b), np.sin(b)
-        at_end = at_low | at_high
-        if at_end.any():
-            c = np.where(at_end, cos, c)
-            s = np.where(at_high, sin, np.where(at_low, -sin, s))
-        v_n, v_t, h = section.respond(data, c, s)
-        power = v_n * c + v_t * s
-        error = b + np.arctan2(c * v_t - s * v_n, power) - wanted
+        along, across, h = section.respond(data, b)
+        error = np.arctan2(across, along)
+        error += b
+        error -= wanted
+        less = error < 0.0
+        low, high = np.where(less, b, low), np.where(less, high, b)
         met = np.abs(error) <= exact
-        above = error > 0.0
-        left, right = ~above & ~met & at_high, above & ~met & at_low
-        high = np.where(above, b, high)
-        low = np.where(above, low, b)
-        high_known |= above
-        low_known |= ~above
-        both = low_known & high_known
-        done = met | left | right
-        narrow = ~done & both & (high - low <= _WIDTH)
-        ends = (done | narrow) & running
+        slides = np.where(less, b >= limit, b <= -limit)
+        # A bracket of one direction is a corner, or as steep as one.
+        ends = met | slides | (high - low <= _WIDTH)
+        ends &= running
         if step == _MAX_ROUNDS:
-            narrow, ends = ~done, running
+            ends = running
         if ends.any():
-            at = rows[ends]
-            exact_here = ~narrow[ends]
-            lows[at] = np.where(exact_here, b[ends], low[ends])
-            highs[at] = np.where(exact_here, b[ends], high[ends])
-            modes[at] = np.where(left[ends], SLIDE_LEFT, np.where(right[ends], SLIDE_RIGHT, STICK))
-            running &= ~ends
+            at, here = rows[ends], b[ends]
+            slide = slides[ends] & ~met[ends]
+            exactly = slide | met[ends]
+            lows[at] = np.where(exactly, here, np.maximum(low[ends], -limit[ends]))
+            highs[at] = np.where(exactly, here, np.minimum(high[ends], limit[ends]))
+            modes[at] = np.where(slide, np.where(less[ends], SLIDE_LEFT, SLIDE_RIGHT), STICK)
+            running = running & ~ends
             active = np.count_nonzero(running)
             if active == 0:
                 break
             if active < _COMPRESS * len(running):
                 keep = np.flatnonzero(running)
-                data = data.take(keep, axis=1)
-                rows = rows[keep]
-                low, high, b, u, w, wanted, limit, cos, sin, width = (
-                    each[keep] for each in (low, high, b, u, w, wanted, limit, cos, sin, width)
+                data, rows, running = data.take(keep, axis=1), rows[keep], running[keep]
+                less = less[keep]
+                limit, wanted, low, high, b, along, across, h, error, width = (
+                    each[keep]
+                    for each in (limit, wanted, low, high, b, along, across, h, error, width)
                 )
-                v_n, v_t, h, power, c, s, error = (
-                    each[keep] for each in (v_n, v_t, h, power, c, s, error)
-                )
-                low_known, high_known, both = low_known[keep], high_known[keep], both[keep]
-                running = running[keep]
-        across = v_n * w - v_t * u
-        along = h * (u * c + w * s) - across * (v_t * c - v_n * s) / power
-        turn = np.abs(np.arctan2(across, along))
-        b = np.where(error > 0.0, b - turn, b + turn)
+        # Newton's step for g^2 / 2, exact for an ellipsoid, towards the root whatever h is.
+        turned = np.sqrt(along * along + across * across) * np.sin(error)
+        ahead = h * np.cos(wanted - b)
+        ahead += turned * across / along
+        turn = np.abs(np.arctan2(turned, ahead))
+        b = np.clip(np.where(less, b + turn, b - turn), -limit, limit)
         halve = ~((low < b) & (b < high))
         if step % _PATIENCE == 0:
-            halve |= both & (high - low > 0.5 * width)
-            width = np.where(both, high - low, np.inf)
+            halve |= (high - low > 0.5 * width) & np.isfinite(high - low)
+            width = high - low
         if halve.any():
-            middle = np.where(
-                error > 0.0,
-                np.where(low_known, 0.5 * (low + high), low),
-                np.where(high_known, 0.5 * (low + high), high),
-            )
+            middle = 0.5 * (np.maximum(low, -limit) + np.minimum(high, limit))
             b = np.where(halve, middle, b)
     return lows, highs, modes
 

@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Outlines without corners: ellipses, and smooth curves through points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from limit_surface_ros.checks import as_floats, as_positive
+from limit_surface_ros.errors import ShapeError
+from limit_surface_ros.motion.outline import (
+    MOST_VERTICES,
+    Nearest,
+    Outline,
+    Polygon,
+    check_length,
+    cross,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from limit_surface_ros.checks import Floats
+
+# Rounds of the searches for a nearest point and a first touch.
+_ROUNDS = 60
+# Samples of a curve between two of its points, and at least in all.
+_SAMPLES, _LEAST_SAMPLES = 8, 128
+
+
+class Ellipse(Outline):
+    """An ellipse, or a circle.
+
+    Args:
+        semi_axes: Half its length and half its width [m].
+        centre: [m], shape (2,).
+        angle: Of the first axis from x [rad].
+
+    Raises:
+        ShapeError: There are not two numbers each.
+        NotFiniteError: A number is NaN or infinite.
+        RangeError: A semi-axis is not above zero, or no length of a body.
+    """
+
+    def __init__(
+        self, semi_axes: ArrayLike, centre: ArrayLike = (0.0, 0.0), angle: float = 0.0
+    ) -> None:
+        """Check the numbers."""
+        axes, middle = as_floats("semi_axes", semi_axes), as_floats("centre", centre)
+        if axes.shape != (2,) or middle.shape != (2,):
+            raise ShapeError("an ellipse has two semi_axes and a centre of two coordinates")
+        for axis in axes.tolist():
+            check_length("semi_axes", as_positive("semi_axes", axis))
+        self.semi_axes, self.centre = axes.copy(), middle.copy()
+        self.angle = float(as_floats("angle", angle))
+        c, s = np.cos(self.angle), np.sin(self.angle)
+        self._turn = np.array([[c, -s], [s, c]])
+
+    @property
+    def is_convex(self) -> bool:
+        """Always."""
+        return True
+
+    def nearest(self, points: Floats) -> Nearest:
+        """See `Outline`: q = (a^2 x / (t + a^2), b^2 y / (t + b^2)), t by Newton's method.
+
+        On the inverse root of its secular equation, which is nearly straight.
+        """
+        own = (points - self.centre) @ self._turn
+        squares = self.semi_axes**2
+        # On an axis within, the nearest point is beside it: a little to one side.
+        sides = np.where(own < 0.0, -1.0, 1.0)
+        away = np.maximum(np.abs(own), 1e-13 * self.semi_axes)
+        t = np.maximum.reduce(self.semi_axes * away - squares, axis=1)
+        scaled = self.semi_axes * away
+        for _ in range(_ROUNDS):
+            share = scaled / (t[:, np.newaxis] + squares)
+            share *= share
+            value = np.add.reduce(share, axis=1)
+            slope = np.add.reduce(share / (t[:, np.newaxis] + squares), axis=1)
+            step = value / slope * (np.sqrt(value) - 1.0)
+            t = t + step
+            if not (np.abs(step) > 1e-15 * squares.max()).any():
+                break
+        feet = sides * squares * away / (t[:, np.newaxis] + squares)
+        normals = feet / squares
+        length = np.hypot(*normals.T)
+        # p - q = t (x / a^2, y / b^2).
+        distances = t * length
+        normals /= length[:, np.newaxis]
+        return Nearest(feet @ self._turn.T + self.centre, normals @ self._turn.T, distances)
+
+    def first_touch(self, starts: Floats, directions: Floats, radius: Floats) -> Floats:
+        """See `Outline`."""
+        return _touch_of_convex(self, starts, directions, radius)
+
+    def drawn(self) -> Floats:
+        """See `Outline`: 120 points."""
+        angles = np.linspace(0.0, 2.0 * np.pi, 120, endpoint=False)
+        around = np.stack([np.cos(angles), np.sin(angles)], axis=1) * self.semi_axes
+        return np.asarray(around @ self._turn.T + self.centre)
+
+
+class SmoothCurve(Outline):
+    """A smooth closed curve through points: a periodic cubic spline over their chord lengths.
+
+    Args:
+        points: In order, either way round, the first not repeated, shape (n, 2) [m].
+
+    Raises:
+        ShapeError, NotFiniteError, GeometryError, RangeError: As `Polygon`.
+    """
+
+    def __init__(self, points: ArrayLike) -> None:
+        """Check the points and interpolate them."""
+        from scipy.interpolate import CubicSpline
+
+        polygon = Polygon(points)
+        knots = np.concatenate([polygon.vertices, polygon.vertices[:1]])
+        lengths = np.hypot(*np.diff(knots, axis=0).T)
+        places = np.concatenate([[0.0], np.cumsum(lengths)])
+        self.points = polygon.vertices
+        self._end = float(places[-1])
+        self._curve = CubicSpline(places, knots, bc_type="periodic")
+        parts = max(_SAMPLES, -(-_LEAST_SAMPLES // len(lengths)))
+        parts = min(parts, max(1, MOST_VERTICES // len(lengths)))
+        share = np.arange(parts) / parts
+        self._places = (places[:-1, np.newaxis] + lengths[:, np.newaxis] * share).ravel()
+        self._samples = Polygon(self._curve(self._places))
+        self._reach = float(np.diff(np.append(self._places, self._end)).max())
+        first, second = self._curve(self._places, 1), self._curve(self._places, 2)
+        bent = cross(first, second)
+        self._is_convex = bool((bent >= -1e-9 * np.abs(bent).max()).all())
+
+    @property
+    def is_convex(self) -> bool:
+        """Whether the curve is bent inward nowhere, as its samples tell."""
+        return self._is_convex
+
+    def nearest(self, points: Floats) -> Nearest:
+        """See `Outline`: Newton's method from the nearest of the curve's samples."""
+        samples = self._samples.vertices
+        square = (samples**2).sum(axis=1) - 2.0 * points @ samples.T
+        start = self._places[square.argmin(axis=1)]
+        place = start
+        for _ in range(_ROUNDS):
+            arm = self._curve(place) - points
+            first, second = self._curve(place, 1), self._curve(place, 2)
+            slope = (arm * first).sum(axis=1)
+            speed = (first * first).sum(axis=1)
+            bend = speed + (arm * second).sum(axis=1)
+            # Where the distance is not convex, Gauss and Newton's step leads down all the same.
+            step = slope / np.where(bend > 0.1 * speed, bend, speed)
+            moved = np.clip(place - step, start - self._reach, start + self._reach)
+            done = not (np.abs(moved - place) > 1e-14 * self._end).any()
+            place = np.mod(moved, self._end) if done else moved
+            if done:
+                break
+        feet, first = (
+            self._curve(np.mod(place, self._end)),
+            self._curve(np.mod(place, self._end), 1),
+        )
+        first /= np.hypot(*first.T)[:, np.newaxis]
+        normals = np.stack([first[:, 1], -first[:, 0]], axis=1)
+        return Nearest(feet, normals, ((points - feet) * normals).sum(axis=1))
+
+    def first_touch(self, starts: Floats, directions: Floats, radius: Floats) -> Floats:
+        """See `Outline`: concave ones from where their samples' polygon is touched."""
+        if self.is_convex:
+            return _touch_of_convex(self, starts, directions, radius)
+        best = self._samples.first_touch(starts, directions, radius)
+        rows = np.flatnonzero(best < np.inf)
+        moved = best[rows]
+        for _ in range(8):
+            near = self.nearest(starts[rows] + moved[:, np.newaxis] * directions[rows])
+            closing = (near.normals * directions[rows]).sum(axis=1)
+            gap = near.distances - radius[rows]
+            moved = np.where(closing < -1e-3, np.maximum(moved - gap / closing, 0.0), moved)
+        best[rows] = moved
+        return np.asarray(best)
+
+    def drawn(self) -> Floats:
+        """See `Outline`: the samples."""
+        return self._samples.vertices
+
+
+def _touch_of_convex(
+    outline: Outline, starts: Floats, directions: Floats, radius: Floats
+) -> Floats:
+    """Return first touches by Newton's method: along a line the distance is convex.
+
+    From outside its steps never pass the root, and the distance stops falling where a tip misses.
+    """
+    moved = np.zeros(len(starts))
+    rows = np.arange(len(starts))
+    for _ in range(_ROUNDS):
+        near = outline.nearest(starts[rows] + moved[rows, np.newaxis] * directions[rows])
+        closing = (near.normals * directions[rows]).sum(axis=1)
+        gap = near.distances - radius[rows]
+        misses = closing >= 0.0
+        moved[rows[misses]] = np.inf
+        step = -gap / np.where(misses, -1.0, closing)
+        goes_on = ~misses & (step > 1e-15 * (1.0 + moved[rows]))
+        moved[rows[goes_on]] += step[goes_on]
+        rows = rows[goes_on]
+        if not len(rows):
+            break
+    return np.asarray(moved)
