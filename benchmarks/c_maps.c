@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 /* The maps in closed form as plain loops: what compiled code could reach at best.
  *
  * The same formulas as limit_surface_ros.surface, one vector after the other. roots holds k

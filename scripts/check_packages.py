@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Check what the two package.xml files promise against the format, the code and each other."""
+"""Check what the package descriptions promise against the format, the code and each other.
+
+That is: both package.xml, setup.py, CMakeLists.txt, the version wherever it is stated, and the
+line of the licence in each file of source.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +17,11 @@ from catkin_pkg.package import InvalidPackage, Package, parse_package
 ROOT = Path(__file__).resolve().parent.parent
 NAME = "limit_surface_ros"
 INTERFACES = "limit_surface_interfaces"
+# Where source is, what is none there, and how a file of source begins (a script: after #!).
+SOURCES = (NAME, INTERFACES, ".ci", "benchmarks", "docs", "examples", "launch", "scripts", "test")
+NOT_SOURCE = {"__pycache__", "_build", "generated"}
+SOURCE_SUFFIXES = {".py", ".c", ".cpp", ".js"}
+LICENCE = "SPDX-License-Identifier: Apache-2.0"
 # Modules whose rosdep key is not their own name.
 ROSDEP_KEYS = {
     "hypothesis": "python3-hypothesis",
@@ -99,10 +108,27 @@ def versions(packages: list[Package]) -> dict[str, str]:
     for path, pattern in (
         ("setup.py", r'version="([^"]+)"'),
         (f"{NAME}/__init__.py", r'__version__ = "([^"]+)"'),
+        ("CITATION.cff", r"(?m)^version: (.+)$"),
     ):
         match = re.search(pattern, (ROOT / path).read_text(encoding="utf-8"))
         found[path] = match[1] if match else "none"
     return found
+
+
+def without_licence() -> list[str]:
+    """Return a sentence for each file of source that does not begin with its licence."""
+    faults = []
+    for folder in SOURCES:
+        for path in sorted((ROOT / folder).rglob("*")):
+            parts = path.relative_to(ROOT).parts
+            if not path.is_file() or set(parts) & NOT_SOURCE:
+                continue
+            lines = path.read_bytes()[:400].decode("utf-8", "replace").splitlines()
+            script = bool(lines) and lines[0].startswith("#!")
+            source = script or path.suffix in SOURCE_SUFFIXES or path.name == "CMakeLists.txt"
+            if source and (len(lines) <= script or LICENCE not in lines[script]):
+                faults.append(f"{path.relative_to(ROOT)}: its first line must state {LICENCE}")
+    return faults
 
 
 def main() -> int:
@@ -126,6 +152,7 @@ def main() -> int:
             if package.package_format != 3:
                 faults.append(f"{package.filename}: format 3 is wanted")
         faults += undeclared(packages[0]) + unlike_cmake(packages[1])
+    faults += without_licence()
     for fault in faults:
         print(fault, file=sys.stderr)
     return 1 if faults else 0
