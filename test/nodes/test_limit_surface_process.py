@@ -157,4 +157,4 @@ def test_a_file_that_both_nodes_of_a_process_were_given_is_told_how_to_give_to_o
         code, output = program.ended()
     assert code == 1
     assert "this is a limit surface, which the limit_surface node serves" in output
-    assert "-p limit_surface:model_files:=" in output
+    assert '-p "limit_surface:model_files:=' in output

@@ -95,7 +95,7 @@ def test_a_file_that_is_half_written_is_not_taken(running, share):
 def test_a_bad_file_is_told_with_file_and_key(running):
     _, model, path, reload, ask = running
     text = path.read_text()
-    path.write_text(text.replace("friction_force: 2.0", "friction_force: 1e-3"))
+    path.write_text(text.replace("friction_force: 2.0", "friction_force: '0.001'"))
     answer = reload()
     assert not answer.success
     assert str(path) in answer.message
