@@ -22,8 +22,6 @@ from limit_surface_ros.surface.scaling import Scaling
 
 SCALING = Scaling(0.1, 5.0)
 SIZES = (100, 1_000, 10_000, 100_000, 1_000_000)
-# Vectors after which a map that searches has made its table.
-TABLE = 30_000
 # Size of the batch at which ours stands beside the ellipsoid.
 COMPARED = 10_000
 # Longest batch [s].
@@ -68,6 +66,7 @@ def ways() -> dict[tuple[str, str], object]:
     found: dict[tuple[str, str], object] = {}
     for map_name, method in MAPS.items():
         for name, surface in kinds().items():
+            surface.prepare()
             found[name, map_name] = getattr(surface, method)
     matrix = random_matrices(1)[0]
     found["peer: ellipsoid in plain numpy", next(iter(MAPS))] = lambda rows: ellipsoid(
@@ -81,7 +80,7 @@ def times_by_size() -> None:
     print("### Time for a vector, alone and in batches\n")
     print(
         f"One thread. Batches that would take more than {PATIENCE:g} s are left out. The maps "
-        "that have to search keep a table once they were asked for much; it is there already.\n"
+        "that have to search read from a table that `prepare()` has made.\n"
     )
     print(
         f"| kind | map | alone [us] | {' | '.join(f'{n:.0e} [ns]' for n in SIZES)} "
@@ -92,7 +91,6 @@ def times_by_size() -> None:
     rows = rng.standard_normal((SIZES[-1], 3)) * [1.0, 1.0, 0.1]
     *all_of_ours, peer = ways().items()
     for (name, map_name), call in (*all_of_ours, peer):
-        call(rows[:TABLE])
         one = rows[0].copy()
         alone = interleaved({"one": lambda c=call, r=one: c(r)})["one"]
         cells, each, ratio = [], alone, ""
@@ -141,6 +139,7 @@ def patch_against_root() -> None:
 
     # Of loads of other motions: the same again would be found in the processor's cache.
     many = surface.wrench_of_twist(rng.standard_normal((4000, 3)) * surface.scaling.twist_unit)
+    surface.prepare()
     times = interleaved({"ours": lambda: surface.twist_of_wrench(many), "root": by_root}, rounds=3)
     found = surface.twist_of_wrench(loads) / surface.scaling.twist_unit
     rooted = by_root()

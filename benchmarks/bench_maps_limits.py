@@ -7,7 +7,7 @@ import time
 import tracemalloc
 
 import numpy as np
-from bench_maps import TABLE, kinds
+from bench_maps import kinds
 from c_maps import compiled, map_in_c
 from interleaved import interleaved
 
@@ -67,9 +67,9 @@ def cost_and_memory() -> None:
     print("| kind | map | vectors | small [ns] | large [ns] | ratio | peak [MB] | / result |")
     print("|---|---|---|---|---|---|---|---|")
     for name, surface in kinds().items():
+        surface.prepare()
         for method in ("load_factor", "twist_of_wrench", "wrench_of_twist"):
             call = getattr(surface, method)
-            call(rows_of(TABLE))
             count = LARGE if timed(call, rows_of(1000)) / 1000 * LARGE < PATIENCE else LARGE // 10
             few, many = rows_of(count // 100), rows_of(count)
             times = interleaved({"few": lambda c=call, r=few: c(r)}, rounds=5)

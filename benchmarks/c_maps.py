@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from limit_surface_ros.surface.gauges.quartic import Quartic
 from limit_surface_ros.surface.kinds.polynomial import Polynomial
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.linalg import root_of
@@ -63,7 +64,8 @@ def map_in_c(
     """
     wrench_unit, twist_unit = surface.scaling.wrench_unit, surface.scaling.twist_unit
     if isinstance(surface, PowerSum):
-        roots, powers = surface._roots, surface.exponents
+        roots = np.array([root_of(matrix) for matrix in surface.matrices])
+        powers = surface.exponents
         constants = [roots, len(powers), wrench_unit, twist_unit]
         if (powers == 0.5).all():
             return "twist_of_wrench", _loop(library.norm_sum_twists, constants)
@@ -72,7 +74,7 @@ def map_in_c(
         constants = [roots, whole, degree, *constants[1:]]
         return "twist_of_wrench", _loop(library.power_sum_twists, constants)
     if isinstance(surface, Polynomial):
-        constants = [surface._second, wrench_unit, twist_unit]
+        constants = [Quartic(surface.coefficients).second, wrench_unit, twist_unit]
         return "twist_of_wrench", _loop(library.quartic_twists, constants)
     roots = np.array([root_of(form) for form in surface.scaled_forms])
     constants = [roots, len(roots), twist_unit, wrench_unit]

@@ -3,10 +3,11 @@
 
 Keys: `schema: 1`, `name`, `kind`, `frame_id`, `reference_point` [m], `characteristic_length` [m],
 `friction_force` [N], `normal_force` [N] (optional), `fit` (how the model came about; free), and
-last the numbers that define the kind: `terms`, `exponents` and `matrices` of a power_sum, `terms`
-and `matrices` of a dissipation, `points` [m] and `friction_limits` [N] of point_contacts,
-`coefficients` of a polynomial in the order of `surface.kinds.polynomial.MONOMIALS`. Because
-these come last and are counted, a file cut short anywhere is refused.
+last the arrays that the kind declares, with the whole numbers that count them: `terms`,
+`exponents` and `matrices` of a power_sum, `terms` and `matrices` of a dissipation, `points` [m]
+and `friction_limits` [N] of point_contacts, `coefficients` of a polynomial in the order of
+`surface.kinds.polynomial.MONOMIALS`. Because these come last and are counted, a file cut short
+anywhere is refused.
 """
 
 from __future__ import annotations
@@ -21,17 +22,14 @@ from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.section import Section, place_errors
 from limit_surface_ros.files.yaml_reader import read_yaml, write_yaml
 from limit_surface_ros.surface.convexity import Convexity, is_convex, warn_unless_convex
-from limit_surface_ros.surface.kinds.dissipation import Dissipation
-from limit_surface_ros.surface.kinds.point_contacts import PointContacts
-from limit_surface_ros.surface.kinds.polynomial import Polynomial
-from limit_surface_ros.surface.kinds.power_sum import PowerSum
+from limit_surface_ros.surface.kinds import KINDS
 from limit_surface_ros.surface.scaling import Scaling
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Sequence
     from pathlib import Path
 
-    from limit_surface_ros.surface.base import LimitSurface
+    from limit_surface_ros.surface.base import FileArray, LimitSurface
 
 SCHEMA = 1
 # Scales [m], [N] beyond this and its reciprocal would take answers out of the range of numbers.
@@ -76,44 +74,31 @@ class SurfaceModel:
         return is_convex(self.surface)
 
 
-def _counted_matrices(section: Section) -> Any:
-    terms = section.integer("terms", at_least=1)
-    return section.array("matrices", (terms, 3, 3))
+def _read_arrays(section: Section, arrays: Sequence[FileArray]) -> dict[str, Any]:
+    """Return the arrays of a kind by their keys."""
+    found: dict[str, Any] = {}
+
+    def length(axis: int | str | None) -> int | None:
+        if not isinstance(axis, str):
+            return axis
+        return len(found[axis]) if axis in found else section.integer(axis, at_least=1)
+
+    # The array with the most axes first: beside it a wrong count shows best.
+    for array in sorted(arrays, key=lambda array: -len(array.shape)):
+        shape = tuple(length(axis) for axis in array.shape)
+        found[array.key] = section.array(array.key, shape, at_least=array.at_least)
+    return found
 
 
-def _read_power_sum(section: Section, scaling: Scaling) -> LimitSurface:
-    matrices = _counted_matrices(section)
-    return PowerSum(matrices, section.array("exponents", (len(matrices),)), scaling)
-
-
-def _read_dissipation(section: Section, scaling: Scaling) -> LimitSurface:
-    return Dissipation(_counted_matrices(section), scaling)
-
-
-def _read_point_contacts(section: Section, scaling: Scaling) -> LimitSurface:
-    points = section.array("points", (None, 2))
-    return PointContacts(
-        points, section.array("friction_limits", (len(points),), at_least=0.0), scaling
-    )
-
-
-def _read_polynomial(section: Section, scaling: Scaling) -> LimitSurface:
-    return Polynomial(section.array("coefficients", (15,)), scaling)
-
-
-_READERS: dict[str, Callable[[Section, Scaling], LimitSurface]] = {
-    "power_sum": _read_power_sum,
-    "dissipation": _read_dissipation,
-    "point_contacts": _read_point_contacts,
-    "polynomial": _read_polynomial,
-}
-# What defines each kind, in the order of the file.
-_DEFINING = {
-    "power_sum": ("exponents", "matrices"),
-    "dissipation": ("matrices",),
-    "point_contacts": ("points", "friction_limits"),
-    "polynomial": ("coefficients",),
-}
+def _counts(surface: LimitSurface) -> dict[str, int]:
+    """Return the whole numbers that a file of this kind gives beside its arrays."""
+    keys = {array.key for array in surface.arrays}
+    return {
+        axis: getattr(surface, array.key).shape[place]
+        for array in surface.arrays
+        for place, axis in enumerate(array.shape)
+        if isinstance(axis, str) and axis not in keys
+    }
 
 
 def read_surface_model(path: str | Path) -> SurfaceModel:
@@ -131,7 +116,7 @@ def read_surface_model(path: str | Path) -> SurfaceModel:
         raise section.error(
             "kind", "this is a decay model: plot_decay draws it and decay_node serves it"
         )
-    kind = section.choice("kind", list(_READERS))
+    kind = KINDS[section.choice("kind", list(KINDS))]
     scaling = Scaling(
         *(
             section.number(key, at_least=1.0 / LARGEST_SCALE, at_most=LARGEST_SCALE)
@@ -140,7 +125,8 @@ def read_surface_model(path: str | Path) -> SurfaceModel:
     )
     reference_point = section.array("reference_point", (2,), (0.0, 0.0))
     history = section.section("fit", {})
-    surface = place_errors(section, kind, lambda: _READERS[kind](section, scaling))
+    arrays = _read_arrays(section, kind.arrays)
+    surface = place_errors(section, kind.kind, lambda: kind.of_arrays(arrays, scaling))
     model = SurfaceModel(
         name=section.text("name"),
         surface=surface,
@@ -166,7 +152,6 @@ def write_surface_model(model: SurfaceModel, path: str | Path, header: str = "")
         FileError: The file cannot be written.
     """
     surface = model.surface
-    defining = {key: getattr(surface, key) for key in _DEFINING[surface.kind]}
     values: dict[str, Any] = {
         "schema": SCHEMA,
         "name": model.name,
@@ -180,6 +165,5 @@ def write_surface_model(model: SurfaceModel, path: str | Path, header: str = "")
         values["normal_force"] = model.normal_force
     if model.fit:
         values["fit"] = dict(model.fit)
-    if "matrices" in defining:
-        values["terms"] = len(defining["matrices"])
-    write_yaml(path, values | defining, header)
+    arrays = {array.key: getattr(surface, array.key) for array in surface.arrays}
+    write_yaml(path, values | _counts(surface) | arrays, header)

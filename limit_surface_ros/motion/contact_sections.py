@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from limit_surface_ros.surface.gauges.power_scale import power_scale
-from limit_surface_ros.surface.kinds.dissipation_surface import DissipationSurface
 from limit_surface_ros.surface.kinds.polynomial import Polynomial
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.linalg import root_of
@@ -246,10 +245,10 @@ class LineSection:
     squares, so that a support point nearly at rest costs no digits.
     """
 
-    def __init__(self, surface: DissipationSurface) -> None:
-        """Factor the terms of a dissipation."""
-        self.terms = len(surface.scaled_forms)
-        self._stacked = np.array([root_of(form) for form in surface.scaled_forms]).reshape(-1, 3)
+    def __init__(self, forms: Floats) -> None:
+        """Factor the terms of a dissipation, the B_k in scaled variables (k, 3, 3)."""
+        self.terms = len(forms)
+        self._stacked = np.array([root_of(form) for form in forms]).reshape(-1, 3)
 
     def of_lines(self, motion: Floats, turn: Floats) -> Floats:
         """Return g_k, w_k and l_k^2 of lines, one column each, shape (3 k, m).

@@ -27,7 +27,6 @@ from limit_surface_ros.motion.push_batch import Contacts, PushBatch
 from limit_surface_ros.motion.push_checks import as_complex, friction_edges, pairs, unit_normals
 from limit_surface_ros.motion.push_roots import SEPARATE
 from limit_surface_ros.motion.push_scalar import ContactScalar, pair, product
-from limit_surface_ros.surface.kinds.dissipation_surface import DissipationSurface
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -101,7 +100,7 @@ def push(
     # The velocity's size is taken out, so that nothing overflows or vanishes on the way.
     speed = hypot(*pushed)
     direction = pushed[0] / speed, pushed[1] / speed
-    if isinstance(surface, DissipationSurface):
+    if surface.wrench_is_closed:
         found = contact.stick_by_turning(surface, direction)
     else:
         found = contact.stick_by_force(direction)

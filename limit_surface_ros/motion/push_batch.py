@@ -22,7 +22,6 @@ from limit_surface_ros.motion.push_roots import (
     force_angles,
     turning_rates,
 )
-from limit_surface_ros.surface.kinds.dissipation_surface import DissipationSurface
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Bools, Complexes, Floats, Places
@@ -82,8 +81,9 @@ class PushBatch:
         self._surface = surface
         self._length = surface.scaling.characteristic_length
         self._section: PlaneSection | LineSection
-        if isinstance(surface, DissipationSurface):
-            self._section = LineSection(surface)
+        forms = surface.scaled_forms
+        if forms is not None:
+            self._section = LineSection(forms)
         else:
             self._section = plane_section(surface)
 

@@ -13,7 +13,6 @@ from limit_surface_ros.bracket import root_bracket
 from limit_surface_ros.checks import as_floats
 from limit_surface_ros.errors import RangeError, ShapeError, ZeroVectorError
 from limit_surface_ros.motion.outcomes import ContactMode, Push
-from limit_surface_ros.surface.kinds.dissipation_surface import DissipationSurface
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -115,7 +114,7 @@ class ContactScalar:
             wrench,
         )
 
-    def stick_by_turning(self, surface: DissipationSurface, velocity: _Pair) -> _Outcome:
+    def stick_by_turning(self, surface: LimitSurface, velocity: _Pair) -> _Outcome:
         """Find the motion of least dissipation in which the body follows the pusher.
 
         The moment about the contact of the load that a turning rate needs rises with the rate,

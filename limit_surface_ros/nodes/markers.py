@@ -17,7 +17,6 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.mesh import mesh_of
 
 if TYPE_CHECKING:
@@ -146,14 +145,15 @@ def contact_marker(canvas: Canvas) -> Marker:
 
     Only a surface of support points knows its contact.
     """
-    surface = canvas.model.surface
-    if not isinstance(surface, PointContacts):
+    contact = canvas.model.surface.contact_points
+    if contact is None:
         return removal(canvas, CONTACT)
+    points, limits = contact
     marker = canvas.marker(CONTACT, Marker.SPHERE_LIST, VERMILION)
-    share = surface.friction_limits / surface.friction_limits.max()
+    share = limits / limits.max()
     size = 0.5 * canvas.length / math.sqrt(len(share))
     marker.scale.x = marker.scale.y = marker.scale.z = max(0.02 * canvas.length, size)
-    marker.points = points_of(np.column_stack([surface.points, np.zeros(len(share))]))
+    marker.points = points_of(np.column_stack([points, np.zeros(len(share))]))
     marker.colors = [
         _color(tuple(s * a + (1.0 - s) * b for a, b in zip(VERMILION, BLUE, strict=True)))
         for s in share

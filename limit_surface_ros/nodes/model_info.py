@@ -21,9 +21,6 @@ if TYPE_CHECKING:
 
 Info = TypeVar("Info", ModelInfo, DecayInfo)
 
-# What counts the terms of a kind, by the attribute that holds them.
-_TERMS = ("matrices", "points", "coefficients")
-
 
 class Listing(Generic[Model, Info]):
     """The list of the models that are served, made anew when others are.
@@ -50,11 +47,10 @@ class Listing(Generic[Model, Info]):
 def model_info(model: SurfaceModel, is_default: bool) -> ModelInfo:
     """Return the message for one limit surface."""
     surface, scaling = model.surface, model.surface.scaling
-    terms = next(len(getattr(surface, key)) for key in _TERMS if hasattr(surface, key))
     return ModelInfo(
         name=model.name,
         kind=surface.kind,
-        terms=terms,
+        terms=surface.terms,
         frame_id=model.frame_id,
         reference_point=list(model.reference_point),
         characteristic_length=scaling.characteristic_length,

@@ -5,15 +5,17 @@ Wrenches are (fx, fy, tau_z) in [N, N, N m], applied *to* the body, about the mo
 point and in its frame. Twists are (vx, vy, omega_z) in [m/s, m/s, rad/s] of the body at that
 point. Their dot product is power.
 
-A kind implements its three maps on *scaled columns*: arrays of shape (3, m), contiguous by
-component, each column of size about one. This base takes what callers pass, of shape (..., 3) in
-physical units, to such columns in blocks that fit the processor's cache, and back.
+A surface is a shape and a scaling. The shape has the three maps on scaled columns, arrays (3, m)
+of numbers of size about one. The base takes what callers pass, of shape (..., 3) in physical
+units, to such columns in blocks that fit the processor's cache, and back.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import fields
+from dataclasses import dataclass, fields
+from functools import cached_property
+from math import inf, sqrt
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
@@ -26,39 +28,125 @@ from limit_surface_ros.checks import (
     one_direction,
 )
 from limit_surface_ros.runtime import keep_scratch
+from limit_surface_ros.surface.scaling import Scaling
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.gauges.one_load import Vector
-    from limit_surface_ros.surface.scaling import Scaling
+    from limit_surface_ros.surface.gauges.gauge import Vector
+    from limit_surface_ros.surface.shape import Shape
 
 Self = TypeVar("Self", bound="LimitSurface")
+
+# Sizes of a scaled vector between which its fourth powers are numbers, for the scalar maps.
+_SMALLEST, _LARGEST = 1e-70, 1e70
+
+
+@dataclass(frozen=True)
+class FileArray:
+    """An array of numbers that defines a surface: an attribute of it, and a key of its file.
+
+    Attributes:
+        key: The name.
+        shape: Lengths of the axes. A name stands for the length of an array before this one, or
+            else for a whole number under that key of the file; None for any length.
+        at_least: Least number allowed in it, if there is one.
+    """
+
+    key: str
+    shape: tuple[int | str | None, ...]
+    at_least: float = -inf
 
 
 class LimitSurface(ABC):
     """The boundary of the convex set of wrenches that dry friction can resist.
 
+    A kind is a frozen dataclass whose fields are its `arrays` and `scaling`; what it says of
+    itself here is all that files, nodes, pictures and programs know of it.
+
     Attributes:
         kind: Name of the kind, as model files give it.
+        arrays: The arrays that define a surface of this kind, in the order of its file.
+        wrench_is_closed: Whether `wrench_of_twist` is in closed form and `twist_of_wrench` is the
+            one that has to search; the other way round if not.
         scaling: Characteristic length [m] and friction force [N] that make it dimensionless.
     """
 
     kind: ClassVar[str]
+    arrays: ClassVar[tuple[FileArray, ...]] = ()
+    wrench_is_closed: ClassVar[bool] = False
     scaling: Scaling
     # Every kind is a dataclass.
     __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @abstractmethod
+    def _new_shape(self) -> Shape:
+        """Return the surface in scaled variables; it does not depend on the friction force."""
+
+    @classmethod
+    def of_arrays(cls: type[Self], arrays: Mapping[str, Any], scaling: Scaling) -> Self:
+        """Return the surface of this kind that some arrays define.
+
+        Args:
+            arrays: By the keys of `arrays`.
+            scaling: Characteristic length [m] and friction force [N].
+        """
+        constructor: Any = cls
+        surface: Self = constructor(**arrays, scaling=scaling)
+        return surface
+
+    @property
+    def terms(self) -> int:
+        """How many terms, points or coefficients define the surface."""
+        return len(getattr(self, self.arrays[0].key)) if self.arrays else 1
+
+    @property
+    def size(self) -> int:
+        """How many numbers define the shape."""
+        return sum(np.size(getattr(self, array.key)) for array in self.arrays)
+
+    @property
+    def convex_because(self) -> str | None:
+        """Why the surface is convex whatever its numbers are; None if they decide."""
+        return None
+
+    @property
+    def scaled_forms(self) -> Floats | None:
+        """The B_k (k, 3, 3) of a dissipation sum_k sqrt(v' B_k v), if the surface has one."""
+        return None
+
+    @property
+    def contact_points(self) -> tuple[Floats, Floats] | None:
+        """Points of contact (n, 2) [m] and their friction limits (n,) [N], if they are known."""
+        return None
+
+    @cached_property
+    def shape(self) -> Shape:
+        """The surface in scaled variables, shared with the same body under other weights."""
+        return self._new_shape()
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what defines the surface: tables made on the way stay out of pickles."""
         return {each.name: self.__dict__[each.name] for each in fields(self)}
 
-    @abstractmethod
+    def scaled(self: Self, factor: float) -> Self:
+        """Return the surface with every wrench on it multiplied by `factor`.
+
+        The load factor of a wrench becomes 1 / factor times what it was, the twists stay. The two
+        surfaces share their shape, so that this costs next to nothing.
+
+        Raises:
+            RangeError: The factor is not a finite number above zero, or makes the friction force
+                none.
+        """
+        factor = as_positive("factor", factor)
+        return self._rescaled(self.scaling.friction_force * factor, factor)
+
     def with_friction_force(self: Self, friction_force: float) -> Self:
-        """Return the same body under another weight.
+        """Return the same body under another weight; see `scaled`.
 
         Args:
             friction_force: The new friction force scale F0 [N]; every limit grows with it.
@@ -66,55 +154,35 @@ class LimitSurface(ABC):
         Raises:
             RangeError: The force is not a finite number above zero.
         """
+        force = as_positive("friction_force", friction_force)
+        return self._rescaled(force, force / self.scaling.friction_force)
 
-    @abstractmethod
-    def _load_factors(self, loads: Floats) -> Floats:
-        """Map scaled loads (3, m) to load factors (m,); 0 for a zero column."""
+    def _rescaled(self: Self, force: float, factor: float) -> Self:
+        scaling = Scaling(self.scaling.characteristic_length, force)
+        # The numbers were checked when this surface was made.
+        rescaled = object.__new__(type(self))
+        rescaled.__dict__.update(self._under(scaling, factor), shape=self.shape)
+        return rescaled
 
-    @abstractmethod
-    def _twists(self, loads: Floats) -> Floats:
-        """Map scaled loads (3, m), none zero, to unit scaled twists (3, m)."""
+    def _under(self, scaling: Scaling, _factor: float) -> dict[str, Any]:
+        """Return the fields of the same body under a weight that is larger by a factor."""
+        state = self.__getstate__()
+        state["scaling"] = scaling
+        return state
 
-    @abstractmethod
-    def _loads(self, twists: Floats) -> Floats:
-        """Map scaled twists (3, m), none zero, to scaled loads (3, m) on the surface."""
+    def prepare(self) -> None:
+        """Make what large batches are answered from, and what a first call would have to make.
 
-    def _twists_and_load_factors(self, loads: Floats) -> tuple[Floats, Floats]:
-        """Map scaled loads (3, m), none zero, to unit scaled twists (3, m) and factors (m,)."""
-        return self._twists(loads), self._load_factors(loads)
-
-    def _load_factor_of_one(self, _wrench: Vector) -> float | None:
-        """Map one wrench in physical units; None leaves it to the map of many."""
-        return None
-
-    def _twist_of_one(self, _wrench: Vector) -> Vector | None:
-        """Map one wrench to a twist, both in physical units; None leaves it to the map of many."""
-        return None
-
-    def _twist_and_load_factor_of_one(self, wrench: Vector) -> tuple[Vector, float] | None:
-        """Map one wrench to both, in physical units; None leaves it to the map of many."""
-        twist, factor = self._twist_of_one(wrench), self._load_factor_of_one(wrench)
-        return None if twist is None or factor is None else (twist, factor)
-
-    def _wrench_of_one(self, _twist: Vector) -> Vector | None:
-        """Map one twist to a wrench, both in physical units; None leaves it to the map of many."""
-        return None
-
-    @property
-    def _block_columns(self) -> int:
-        """Columns per block: a few dozen arrays of this length stay in the processor's cache."""
-        return 10240
-
-    def scaled(self: Self, factor: float) -> Self:
-        """Return the surface with every wrench on it multiplied by `factor`.
-
-        The load factor of a wrench becomes 1 / factor times what it was, the twists stay.
-
-        Raises:
-            RangeError: The factor is not a finite number above zero.
+        That takes from a millisecond to about a second, once for all weights of a body, and may be
+        done in another thread meanwhile calls are answered. Calls never do it because of what was
+        asked before; one call with so many vectors that it pays within that call does.
         """
-        factor = as_positive("factor", factor)
-        return self.with_friction_force(self.scaling.friction_force * factor)
+        self.shape.expect(inf)
+        for vector in ([1.0, 0.0, 0.0], [[0.0, 1.0, 0.0]]):
+            unit = np.asarray(vector)
+            self.load_factor(unit)
+            if not self.wrench_is_closed:
+                self.wrench_of_twist(unit)
 
     def load_factor(self, wrench: ArrayLike) -> Floats:
         """How far out a wrench lies: the s with wrench / s on the surface.
@@ -131,9 +199,9 @@ class LimitSurface(ABC):
             ShapeError: The last axis does not hold three components.
             NotFiniteError: A component is NaN or infinite.
         """
-        one = one_direction(wrench)
+        one = self._one_load(wrench)
         if one is not None:
-            factor = self._load_factor_of_one(one)
+            factor = self.shape.load_factor_scalar(one)
             if factor is not None:
                 scalar: Floats = np.float64(factor)
                 return scalar
@@ -141,7 +209,7 @@ class LimitSurface(ABC):
         factors = np.empty(array.size // 3)
         unit = self.scaling.wrench_unit
         for block, columns, sizes in self._blocks("wrench", array, unit, zeros=True):
-            np.multiply(self._load_factors(columns), sizes, out=factors[block])
+            np.multiply(self.shape.load_factors(columns), sizes, out=factors[block])
         return factors.reshape(array.shape[:-1])[()]
 
     def twist_of_wrench(self, wrench: ArrayLike) -> Floats:
@@ -159,13 +227,13 @@ class LimitSurface(ABC):
             NotFiniteError: A component is NaN or infinite.
             ZeroVectorError: A wrench is zero.
         """
-        one = one_direction(wrench)
+        one = self._one_load(wrench)
         if one is not None:
-            twist = self._twist_of_one(one)
-            if twist is not None:
-                return np.array(twist)
+            found = self.shape.load_factor_and_motion_scalar(one)
+            if found is not None:
+                return self._twist_along(found[1])
         unit_in, unit_out = self.scaling.wrench_unit, self.scaling.twist_unit
-        return self._mapped("wrench", wrench, unit_in, self._twists, unit_out)
+        return self._mapped("wrench", wrench, unit_in, self.shape.motions, unit_out)
 
     def twist_and_load_factor(self, wrench: ArrayLike) -> tuple[Floats, Floats]:
         """Direction of the incipient motion and load factor, for less than both cost apart.
@@ -181,17 +249,17 @@ class LimitSurface(ABC):
             NotFiniteError: A component is NaN or infinite.
             ZeroVectorError: A wrench is zero.
         """
-        one = one_direction(wrench)
+        one = self._one_load(wrench)
         if one is not None:
-            found = self._twist_and_load_factor_of_one(one)
+            found = self.shape.load_factor_and_motion_scalar(one)
             if found is not None:
-                return np.array(found[0]), np.float64(found[1])
+                return self._twist_along(found[1]), np.float64(found[0])
         array = as_rows("wrench", wrench)
         twists, factors = np.empty((array.size // 3, 3)), np.empty(array.size // 3)
         for block, columns, sizes in self._blocks("wrench", array, self.scaling.wrench_unit):
-            scaled_twists, scaled_factors = self._twists_and_load_factors(columns)
+            motions, scaled_factors = self.shape.motions_and_load_factors(columns)
             np.multiply(scaled_factors, sizes, out=factors[block])
-            _write(scaled_twists, self.scaling.twist_unit, twists[block])
+            _write(motions, self.scaling.twist_unit, twists[block])
         return twists.reshape(array.shape), factors.reshape(array.shape[:-1])[()]
 
     def wrench_of_twist(self, twist: ArrayLike) -> Floats:
@@ -211,11 +279,33 @@ class LimitSurface(ABC):
         """
         one = one_direction(twist)
         if one is not None:
-            wrench = self._wrench_of_one(one)
-            if wrench is not None:
-                return np.array(wrench)
+            x, y, z = one[0], one[1], one[2] * self.scaling.characteristic_length
+            if _SMALLEST < abs(x) + abs(y) + abs(z) < _LARGEST:
+                load = self.shape.load_scalar((x, y, z))
+                if load is not None:
+                    force = self.scaling.friction_force
+                    torque = force * self.scaling.characteristic_length * load[2]
+                    return np.array((force * load[0], force * load[1], torque))
         unit_in, unit_out = self.scaling.twist_unit, self.scaling.wrench_unit
-        return self._mapped("twist", twist, unit_in, self._loads, unit_out)
+        return self._mapped("twist", twist, unit_in, self.shape.loads, unit_out)
+
+    def _one_load(self, wrench: Any) -> Vector | None:
+        """Return a single, plainly valid wrench in scaled variables, None for anything else."""
+        one = one_direction(wrench)
+        if one is None:
+            return None
+        force = self.scaling.friction_force
+        x, y = one[0] / force, one[1] / force
+        z = one[2] / (force * self.scaling.characteristic_length)
+        return (x, y, z) if _SMALLEST < abs(x) + abs(y) + abs(z) < _LARGEST else None
+
+    def _twist_along(self, motion: Vector) -> Floats:
+        """Return the twist of unit norm along a scaled motion."""
+        x, y, z = motion
+        length = sqrt(x * x + y * y + z * z)
+        return np.array(
+            (x / length, y / length, z / (length * self.scaling.characteristic_length))
+        )
 
     def _mapped(
         self,
@@ -241,7 +331,8 @@ class LimitSurface(ABC):
         tells, for less than a look at each number costs, whether all is well with a vector.
         """
         rows = array.reshape(-1, 3)
-        count = self._block_columns
+        self.shape.expect(len(rows))
+        count = self.shape.columns_at_once
         keep_scratch(len(rows))
         for start in range(0, len(rows), count):
             block = slice(start, start + count)

@@ -9,30 +9,29 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.surface.gauges.power_sum import PowerGauge
-from limit_surface_ros.surface.kinds.polynomial import Polynomial
-from limit_surface_ros.surface.kinds.power_sum import PowerSum
-from limit_surface_ros.surface.linalg import even_directions, root_of
+from limit_surface_ros.surface.linalg import even_directions
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.surface.base import LimitSurface
-    from limit_surface_ros.surface.support.newton import Gauge
+    from limit_surface_ros.surface.gauges.gauge import Gauge
 
 # Directions of load that are looked at where no theorem decides.
 _DIRECTIONS = 20_000
-# Keeps a gauge that does not bend at all from dividing zero by zero.
+# Keeps a gauge without curvature from dividing zero by zero.
 _TINY = np.finfo(np.float64).tiny
 # Parts of them that fit the cache.
 _BLOCKS = 6
 # Curvature, relative to the largest at the same load, below which a surface bends inward.
 _INWARD = -1e-9
+# Part by which the middle of a chord is outside if that is not rounding.
+_OUTSIDE = 1e-12
 # How far to either side the counter-example goes, halved until its middle is outside.
 _REACH = 0.5
 
 
 class NotConvexWarning(UserWarning):
-    """A surface is not convex: a facet's or a dent's twists are of loads inside its hull."""
+    """A surface is not convex: where it bends inward its two maps are not inverse."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,46 +54,50 @@ class Convexity:
     counter_example: Floats | None
 
 
-def is_convex_by_construction(surface: LimitSurface) -> bool:
-    """Tell whether a surface is convex whatever its coefficients are.
-
-    Support points and dissipations are; a power sum is if every exponent is at least 1/2, for
-    then each term is a convex function, or if it has but one; of a polynomial nothing is known
-    without its coefficients.
-    """
-    if isinstance(surface, PowerSum):
-        return len(surface.matrices) == 1 or bool(surface.exponents.min() >= 0.5)
-    return surface.kind in ("dissipation", "point_contacts")
-
-
 def is_convex(surface: LimitSurface) -> Convexity:
     """Tell whether a surface is convex, with a certificate or a counter-example.
 
-    Where no theorem decides, the curvature of the gauge is looked at in 20 000 directions of
-    load spread evenly over the sphere. If one bends inward, a chord that leaves the surface there
-    is the counter-example; if none does, that is no proof and `proved` is false.
+    Where no theorem decides, the curvature of the gauge is looked at in 20 000 directions of load
+    spread evenly over the sphere. If one is negative, a chord that leaves the surface there is
+    the counter-example; if none is, that is no proof and `proved` is false. Of a kind that does
+    not give its curvature, chords alone are looked at.
     """
-    if is_convex_by_construction(surface):
-        return Convexity(True, True, _theorem(surface), 0.0, None)
+    theorem = surface.convex_because
+    if theorem is not None:
+        return Convexity(True, True, theorem, 0.0, None)
     # The surface is the same at f and -f: half the sphere stands for all of it.
     directions = even_directions(_DIRECTIONS)[_DIRECTIONS // 2 :]
-    gauge = _gauge_of(surface)
+    gauge = surface.shape.gauge
+    if gauge is None:
+        return _by_chords(surface, directions)
     blocks = np.array_split(directions, _BLOCKS)
-    relative = np.concatenate([_least_bend(_hessians(gauge, block)) for block in blocks])
+    relative = np.concatenate([_least_curvature(_hessians(gauge, block)) for block in blocks])
     share = float((relative < _INWARD).mean())
     if share == 0.0:
-        reason = f"no direction of {_DIRECTIONS} bends inward"
+        reason = f"no direction of {_DIRECTIONS} has a negative curvature"
         return Convexity(True, False, reason, 0.0, None)
     worst = int(relative.argmin())
     hessian = _hessians(gauge, directions[worst : worst + 1])[:, :, 0]
     chord = _outer_chord(surface, directions[worst], np.linalg.eigh(hessian)[1][:, 0])
-    return Convexity(
-        False,
-        chord is not None,
-        f"it bends inward in {100.0 * share:.2g} % of the directions of load",
-        share,
-        chord,
-    )
+    reason = f"it bends inward in {100.0 * share:.2g} % of the directions of load"
+    return Convexity(False, chord is not None, reason, share, chord)
+
+
+def _by_chords(surface: LimitSurface, directions: Floats) -> Convexity:
+    """Tell by chords between points of the surface whether one leaves it."""
+    points = directions * surface.scaling.wrench_unit
+    points /= surface.load_factor(points)[:, np.newaxis]
+    ends = np.concatenate([points, -points])
+    others = np.random.default_rng(0).permutation(len(ends))
+    chords = np.array([ends, ends[others]])
+    factors = surface.load_factor(chords.mean(axis=0))
+    outside = factors > 1.0 + _OUTSIDE
+    if not outside.any():
+        reason = f"no chord of {len(factors)} leaves the surface"
+        return Convexity(True, False, reason, 0.0, None)
+    share = float(outside.mean())
+    reason = f"{100.0 * share:.2g} % of its chords leave it"
+    return Convexity(False, True, reason, share, np.asarray(chords[:, factors.argmax()]))
 
 
 def warn_unless_convex(convexity: Convexity, name: str) -> None:
@@ -106,27 +109,12 @@ def warn_unless_convex(convexity: Convexity, name: str) -> None:
     """
     if not convexity.convex:
         warnings.warn(
-            f"limit surface {name!r} is not convex: {convexity.reason}; there the wrench of the "
-            "twist of a wrench is another one, that of maximum dissipation",
+            f"limit surface {name!r} is not convex: {convexity.reason}; in those directions "
+            "twist_to_wrench(wrench_to_twist(w)) returns another wrench: the one of maximum "
+            "dissipation",
             NotConvexWarning,
             stacklevel=2,
         )
-
-
-def _theorem(surface: LimitSurface) -> str:
-    if not isinstance(surface, PowerSum):
-        return "its dissipation is a sum of norms, so that its loads are a sum of convex sets"
-    if len(surface.matrices) == 1:
-        return "it is an ellipsoid"
-    return "every exponent is at least 1/2, so that every term is convex"
-
-
-def _gauge_of(surface: LimitSurface) -> Gauge:
-    if isinstance(surface, PowerSum):
-        return PowerGauge(np.array([root_of(m) for m in surface.matrices]), surface.exponents)
-    if isinstance(surface, Polynomial):
-        return surface
-    raise TypeError(f"no gauge is known for a surface of kind {surface.kind!r}")
 
 
 def _hessians(gauge: Gauge, directions: Floats) -> Floats:
@@ -135,10 +123,10 @@ def _hessians(gauge: Gauge, directions: Floats) -> Floats:
     return gauge.derivatives(columns, np.zeros(len(directions)))[2]
 
 
-def _least_bend(hessians: Floats) -> Floats:
+def _least_curvature(hessians: Floats) -> Floats:
     """Return the lower curvature over the larger, shape (m,), of Hessians (3, 3, m).
 
-    A gauge does not bend along its load, so that one eigenvalue is zero and the other two follow
+    A gauge is linear along its load, so that one eigenvalue is zero and the other two follow
     from their sum and product: a hundred times as fast as an eigenvalue solver.
     """
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = hessians
@@ -154,7 +142,7 @@ def _outer_chord(surface: LimitSurface, load: Floats, across: Floats) -> Floats 
     while reach > 1e-6:
         ends = (load + np.array([[reach], [-reach]]) * across) * surface.scaling.wrench_unit
         ends /= surface.load_factor(ends)[:, np.newaxis]
-        if surface.load_factor(ends.mean(axis=0)) > 1.0 + 1e-12:
+        if surface.load_factor(ends.mean(axis=0)) > 1.0 + _OUTSIDE:
             return np.asarray(ends)
         reach *= 0.5
     return None

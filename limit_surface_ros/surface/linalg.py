@@ -22,6 +22,8 @@ _RANK_TOLERANCE = 8 * np.finfo(np.float64).eps
 
 # A form v'Av below this part of trace(A) v'v is zero but for rounding: v is in A's null space.
 NULL_TOLERANCE = 1e-28
+# Singular value, relative to the largest, below which one is rounding.
+_NULL_SINGULAR = 1e-14
 
 _ONES = np.ones(3)
 
@@ -134,3 +136,17 @@ def squared_lengths(columns: Floats) -> Floats:
     """Return the squared lengths (m,) of vectors (3, m)."""
     # The quickest way for few and for many.
     return np.asarray(_ONES.dot(columns * columns))
+
+
+def null_space(roots: Floats) -> Floats:
+    """Return orthonormal vectors (q, 3) that matrices R_k (k, 3, 3) all take to zero.
+
+    Each column is measured in its own size, so that neither units nor factors of 1e12 between the
+    matrices make a vector of what is small.
+    """
+    rows = roots.reshape(-1, 3)
+    sizes = np.sqrt(np.square(rows).sum(axis=0))
+    sizes[sizes == 0.0] = 1.0
+    _, singular, vectors = np.linalg.svd(rows / sizes)
+    null = vectors[singular <= _NULL_SINGULAR * singular[0]] / sizes
+    return np.linalg.qr(null.T)[0].T if len(null) else np.empty((0, 3))

@@ -7,7 +7,8 @@ vectors and angles between motions are measured in them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,8 +26,6 @@ class Scaling:
     Attributes:
         characteristic_length: rho [m].
         friction_force: F0 [N].
-        wrench_unit: (F0, F0, F0 rho) in [N, N, N m], shape (3,).
-        twist_unit: (1, 1, 1 / rho) in [m/s, m/s, rad/s], shape (3,).
 
     Raises:
         RangeError: A scale is not a finite number above zero.
@@ -34,14 +33,21 @@ class Scaling:
 
     characteristic_length: float = 1.0
     friction_force: float = 1.0
-    wrench_unit: Floats = field(init=False, repr=False, compare=False)
-    twist_unit: Floats = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Check the two scales and derive the units."""
+        """Check the two scales."""
         rho = as_positive("characteristic_length", self.characteristic_length)
         force = as_positive("friction_force", self.friction_force)
         object.__setattr__(self, "characteristic_length", rho)
         object.__setattr__(self, "friction_force", force)
-        object.__setattr__(self, "wrench_unit", np.array([force, force, force * rho]))
-        object.__setattr__(self, "twist_unit", np.array([1.0, 1.0, 1.0 / rho]))
+
+    @cached_property
+    def wrench_unit(self) -> Floats:
+        """(F0, F0, F0 rho) in [N, N, N m], shape (3,)."""
+        force = self.friction_force
+        return np.array([force, force, force * self.characteristic_length])
+
+    @cached_property
+    def twist_unit(self) -> Floats:
+        """(1, 1, 1 / rho) in [m/s, m/s, rad/s], shape (3,)."""
+        return np.array([1.0, 1.0, 1.0 / self.characteristic_length])

@@ -30,10 +30,6 @@ from limit_surface_ros.fitting.search import Search, process_pool
 from limit_surface_ros.fitting.workers import available_cores
 from limit_surface_ros.plots.canvas import SUFFIXES, new_figure, save_figure
 from limit_surface_ros.plots.distributions import draw_distributions
-from limit_surface_ros.surface.kinds.dissipation import Dissipation
-from limit_surface_ros.surface.kinds.point_contacts import PointContacts
-from limit_surface_ros.surface.kinds.polynomial import Polynomial
-from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.measures import load_error, quantiles, velocity_error
 from limit_surface_ros.tools.fit_options import OF_AUTO
 from limit_surface_ros.tools.options import check_output, named_path, refuse_unused
@@ -141,17 +137,6 @@ def options_of(options: argparse.Namespace, wanted: str) -> argparse.Namespace:
     return chosen
 
 
-def size_of(surface: LimitSurface) -> int:
-    """Return how many numbers define a surface of a kind that model files hold."""
-    if isinstance(surface, (PowerSum, Dissipation)):
-        return 6 * len(surface.matrices)  # a symmetric matrix each
-    if isinstance(surface, Polynomial):
-        return len(surface.coefficients)
-    if isinstance(surface, PointContacts):
-        return 3 * len(surface.points)  # x, y and friction limit each
-    raise TypeError(f"no size is known of a {surface.kind}")
-
-
 def microseconds_each(function: Callable[[Floats], Floats], vectors: Floats) -> float:
     """Return the time of a map for one vector of many [us], the best of three runs."""
     times = []
@@ -198,7 +183,7 @@ def row_of(compared: Compared, test: Pairs) -> list[str]:
     return [
         compared.name,
         surface.kind,
-        str(size_of(surface)),
+        str(surface.size),
         *(f"{value:.3f}" for value in errors.velocity),
         f"{np.degrees(errors.mean_angle):.2f}",
         *(f"{value:.3f}" for value in loads),

@@ -13,7 +13,7 @@ from limit_surface_ros.surface.kinds.polynomial import Polynomial
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 from limit_surface_ros.tools import fit_surface
-from limit_surface_ros.tools.compare_surfaces import main, size_of
+from limit_surface_ros.tools.compare_surfaces import main
 
 CONTACT = """schema: 1
 name: triangle
@@ -161,9 +161,9 @@ def test_a_model_that_is_not_convex_is_warned_of_in_one_plain_line(contact, tmp_
 
 def test_the_size_of_every_kind_is_how_many_numbers_define_it():
     points = PointContacts([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]], [0.5, 0.5, 0.5])
-    assert size_of(points) == 9
-    assert size_of(points.dissipation()) == 18
-    assert size_of(PowerSum(np.eye(3)[None], [1.0])) == 6
+    assert points.size == 9
+    assert points.dissipation().size == 18
+    assert PowerSum(np.eye(3)[None], [1.0]).size == 6
 
 
 def test_a_kind_that_the_data_cannot_support_is_left_out_with_its_reason(contact, capsys):

@@ -11,11 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limit_surface_ros.checks import as_floats
 from limit_surface_ros.errors import DataError, RangeError, SolverError
 from limit_surface_ros.fitting.few_pushes.recipe import FitContext
-from limit_surface_ros.surface.kinds.dissipation import Dissipation
-from limit_surface_ros.surface.kinds.power_sum import PowerSum
+from limit_surface_ros.surface.kinds import KINDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -113,14 +111,16 @@ def twist_spread(surfaces: Sequence[LimitSurface], wrench: ArrayLike) -> Floats:
 
 
 def stored_surfaces(surfaces: Sequence[LimitSurface]) -> dict[str, Any]:
-    """Return the surfaces of a bootstrap as plain values for a model file."""
+    """Return the surfaces of a bootstrap as plain values for a model file.
+
+    Arrays before the last of the kind, as exponents, are stored once if all surfaces share them.
+    """
     first = surfaces[0]
-    values: dict[str, Any] = {"kind": first.kind, "matrices": []}
-    if isinstance(first, PowerSum):
-        values["exponents"] = first.exponents.tolist()
-    for surface in surfaces:
-        assert isinstance(surface, (PowerSum, Dissipation))
-        values["matrices"].append(surface.matrices.tolist())
+    values: dict[str, Any] = {"kind": first.kind}
+    for array in first.arrays:
+        each = [getattr(surface, array.key).tolist() for surface in surfaces]
+        shared = array is not first.arrays[-1] and all(one == each[0] for one in each)
+        values[array.key] = each[0] if shared else each
     return values
 
 
@@ -135,10 +135,23 @@ def surfaces_of(stored: Mapping[str, Any], scaling: Scaling) -> tuple[LimitSurfa
         DataError: It is not what `stored_surfaces` makes.
     """
     try:
+        kind = KINDS[stored["kind"]]
+        count = len(stored[kind.arrays[-1].key])
         # Refits need not have the same number of terms.
-        matrices = [as_floats("matrices", each) for each in stored["matrices"]]
-        if stored["kind"] == PowerSum.kind:
-            return tuple(PowerSum(each, stored["exponents"], scaling) for each in matrices)
-        return tuple(Dissipation(each, scaling) for each in matrices)
-    except (KeyError, TypeError, ValueError) as error:
+        columns = {
+            array.key: [stored[array.key]] * count
+            if _depth(stored[array.key]) == len(array.shape)
+            else stored[array.key]
+            for array in kind.arrays
+        }
+        return tuple(
+            kind.of_arrays({key: each[index] for key, each in columns.items()}, scaling)
+            for index in range(count)
+        )
+    except (KeyError, IndexError, TypeError, ValueError) as error:
         raise DataError(f"fit: bootstrap holds no surfaces: {error}") from None
+
+
+def _depth(values: Any) -> int:
+    """Return how deep lists are nested in the first places of each other."""
+    return 1 + _depth(values[0]) if isinstance(values, list) and values else 0

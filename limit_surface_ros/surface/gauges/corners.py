@@ -32,13 +32,13 @@ class Corners:
         points: x_k, scaled so that c_k.x_k = 1, shape (q, 3).
         inverses: G_k with G_k R_k' = 1, shape (q, 2, 3).
         centres: G_k c_k, shape (q, 2).
-        bends: G_k H_k G_k' with the Hessian H_k of the rest, shape (q, 2, 2).
+        curvatures: G_k H_k G_k' with the Hessian H_k of the rest, shape (q, 2, 2).
     """
 
     points: Floats
     inverses: Floats
     centres: Floats
-    bends: Floats
+    curvatures: Floats
 
     @classmethod
     def of_norms(
@@ -83,24 +83,25 @@ class Corners:
         distance[distance <= 1.0 + RIM] = 1.0
         beyond = np.flatnonzero(distance > 1.0)
         if len(beyond):
-            points[:, beyond] += self._way(
+            points[:, beyond] += self._offsets(
                 which[beyond],
                 *(each.take(beyond, axis=-1) for each in (normals / power, q, distance)),
             )
         points *= np.sign(power)
         return distance, points
 
-    def _way(self, which: Places, normals: Floats, q: Floats, distance: Floats) -> Floats:
-        """Return the ways (3, m) from corners to the points to expect beyond their cones.
+    def _offsets(self, which: Places, normals: Floats, q: Floats, distance: Floats) -> Floats:
+        """Return the steps (3, m) from corners to the points to expect beyond their cones.
 
-        |y| - q.y + y'My/2 in y = R_k (x - x_k) is least near y along q.
+        To second order the gauge beside a corner is |y| - q.y + y'My/2 in y = R_k (x - x_k), which
+        is least near y along q.
         """
-        bends = np.moveaxis(self.bends, 0, -1).take(which, axis=2)
-        bend = ((bends * q).sum(axis=1) * q).sum(axis=0) + FLAT * distance**2
-        y = q * ((distance - 1.0) * distance / bend)
+        matrices = np.moveaxis(self.curvatures, 0, -1).take(which, axis=2)
+        curvature = ((matrices * q).sum(axis=1) * q).sum(axis=0) + FLAT * distance**2
+        y = q * ((distance - 1.0) * distance / curvature)
         inverses = np.moveaxis(self.inverses, 0, -1).take(which, axis=2)
-        move = (inverses * y[:, np.newaxis]).sum(axis=0)
-        return np.asarray(move - self.points.T.take(which, axis=1) * (normals * move).sum(axis=0))
+        step = (inverses * y[:, np.newaxis]).sum(axis=0)
+        return np.asarray(step - self.points.T.take(which, axis=1) * (normals * step).sum(axis=0))
 
     def _nearest(self, normals: Floats) -> Places:
         """Return which corner is nearest to each normal, (m,)."""

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The dissipation D(v) of a sliding body as a sum of norms, with its derivatives and facets.
+"""Sums of norms as gauges: of matrices, and of the velocities of support points.
 
-Both the sums of quadratic-form norms and support points speak this one language to
-`gauge_inverse`. All arrays are scaled columns.
+As the dissipation of a body they are gauges of motions, as a power sum with every exponent 1/2
+they are gauges of loads. All arrays are scaled columns.
 """
 
 from __future__ import annotations
@@ -12,105 +12,99 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from limit_surface_ros.surface.gauges.corners import Corners
-from limit_surface_ros.surface.support.newton import Gauge
+from limit_surface_ros.surface.gauges.gauge import Gauge
+from limit_surface_ros.surface.linalg import squared_lengths
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.checks import Floats, Places
 
 # A term whose norm is smaller than this, relative to what it could be, is at its kink.
 KINK = 1e-14
+# Two zeros of norms closer than this, in parts of a norm's size, are one.
+_APART = 1e-9
 # Elements of one array of points by motions, of which several stay in the processor's cache.
 _ELEMENTS = 2**14
 
 
-class DissipationTerms(Gauge, Protocol):
-    """A sum of norms D(v) = sum_k |R_k v|, each smoothed to sqrt(|R_k v|^2 + (e size)^2)."""
-
-    def gradient(self, twists: Floats) -> Floats:
-        """Return the gradient (3, m) of D; a term at its kink adds nothing."""
-        ...
-
-    def values_and_normals(self, twists: Floats) -> tuple[Floats, Floats]:
-        """Return D (m,) and its gradient (3, m), as `gradient` does."""
-        ...
+class NormSumGauge(Gauge, Protocol):
+    """A sum of norms sum_k |R_k x|, each smoothed to sqrt(|R_k x|^2 + (e size)^2)."""
 
     def corners(self) -> Corners | None:
-        """Return the motions at which one term is at rest: facets of the set of loads."""
+        """Return the points where one norm is zero: at each many normals meet."""
         ...
 
 
-class FormTerms:
-    """D(v) = sum_k sqrt(v' B_k v) with B_k = R_k' R_k."""
+class NormSum:
+    """The sum of |R_k x| for matrices R_k."""
 
     def __init__(self, roots: Floats) -> None:
-        """Keep the factors R_k, shape (k, 3, 3)."""
+        """Keep the R_k, shape (k, 3, 3)."""
         self._roots = roots
         self._forms = np.swapaxes(roots, 1, 2) @ roots
         self._sizes = np.sqrt(np.trace(self._forms, axis1=1, axis2=2))
         self._stacked_roots = roots.reshape(-1, 3)
-        self._least = KINK * self._sizes
-        self._most = float(self._least.max())
+        # A matrix of full rank, as `root_of` tells it, has no kink.
+        self._has_kinks = not np.abs(roots).any(axis=2).all()
+        self._least = KINK * self._sizes[:, np.newaxis]
 
-    def gradient(self, twists: Floats) -> Floats:
-        """Return the gradient (3, m) of D; a term at its kink adds nothing.
-
-        In the precision of the twists.
-        """
-        return self.values_and_normals(twists)[1]
-
-    def values_and_normals(self, twists: Floats) -> tuple[Floats, Floats]:
-        """Return D (m,) and its gradient (3, m), as `gradient` does."""
-        roots = self._stacked_roots.astype(twists.dtype, copy=False)
-        images = roots.dot(twists).reshape(-1, 3, twists.shape[1])
+    def values_and_normals(self, points: Floats) -> tuple[Floats, Floats]:
+        """Return the sum (m,) and its gradient (3, m); a norm at its kink is zero in both."""
+        images = self._stacked_roots.dot(points).reshape(-1, 3, points.shape[1])
         norms = np.sqrt(np.einsum("kcm,kcm->km", images, images))
-        values = np.add.reduce(norms)
-        # The least of all norms is cheaper than one bound for each, and is most often enough.
-        if norms.min() <= self._most * np.abs(twists).max():
-            length = np.abs(twists).max(axis=0)
-            norms[norms <= self._least[:, np.newaxis] * length] = np.inf
+        if self._has_kinks:
+            null = norms <= self._least * np.sqrt(squared_lengths(points))
+            if null.any():
+                norms[null] = 0.0
+                values = np.add.reduce(norms)
+                norms[null] = np.inf
+                return values, self._normals(images, norms)
+        return np.add.reduce(norms), self._normals(images, norms)
+
+    def _normals(self, images: Floats, norms: Floats) -> Floats:
         images /= norms[:, np.newaxis]
-        return values, np.asarray(roots.T.dot(images.reshape(-1, twists.shape[1])))
+        return np.asarray(self._stacked_roots.T.dot(images.reshape(-1, images.shape[2])))
 
-    def values(self, twists: Floats) -> Floats:
-        """Return D (m,)."""
-        total: Floats = np.zeros(twists.shape[1])
-        for root in self._roots:
-            image = root @ twists
-            total += np.sqrt((image * image).sum(axis=0))
-        return total
+    def values(self, points: Floats) -> Floats:
+        """Return the sum (m,)."""
+        images = self._stacked_roots.dot(points).reshape(-1, 3, points.shape[1])
+        norms = np.sqrt(np.einsum("kcm,kcm->km", images, images))
+        if self._has_kinks:
+            norms[norms <= self._least * np.sqrt(squared_lengths(points))] = 0.0
+        return np.asarray(np.add.reduce(norms))
 
-    def derivatives(self, twists: Floats, smoothing: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return D, its gradient and Hessian; see `Gauge`."""
-        total: Floats = np.zeros(twists.shape[1])
-        gradient: Floats = np.zeros_like(twists)
-        hessian: Floats = np.zeros((3, 3, twists.shape[1]))
+    def derivatives(self, points: Floats, smoothing: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return the sum, its gradient and Hessian; see `Gauge`."""
+        total: Floats = np.zeros(points.shape[1])
+        gradient: Floats = np.zeros_like(points)
+        hessian: Floats = np.zeros((3, 3, points.shape[1]))
+        lengths = np.sqrt(squared_lengths(points))
         for root, form, size in zip(self._roots, self._forms, self._sizes, strict=True):
-            image = root @ twists
+            image = root @ points
             norm = np.sqrt((image * image).sum(axis=0) + (size * smoothing) ** 2)
             total += norm
-            norm[norm <= KINK * size * np.sqrt((twists * twists).sum(axis=0))] = np.inf
-            pull = root.T @ (image / norm)
-            gradient += pull
-            hessian += (form[:, :, np.newaxis] - pull[:, np.newaxis] * pull) / norm
+            norm[norm <= KINK * size * lengths] = np.inf
+            part = root.T @ (image / norm)
+            gradient += part
+            hessian += (form[:, :, np.newaxis] - part[:, np.newaxis] * part) / norm
         return total, gradient, hessian
 
     def corners(self) -> Corners | None:
-        """Return those of each term of rank two whose motion at rest is no other term's."""
+        """Return the zeros of each norm of rank two that are no other norm's."""
         flat = np.abs(self._roots).any(axis=2).sum(axis=1) == 2
         roots = self._roots[flat][:, :2]
         kinks = np.cross(roots[:, 0], roots[:, 1])
         kinks /= np.linalg.norm(kinks, axis=1, keepdims=True)
-        moving = np.linalg.norm(self._roots @ kinks.T, axis=1) > 1e-9 * self._sizes[:, np.newaxis]
-        alone = moving.sum(axis=0) == len(self._roots) - 1
+        rest = np.linalg.norm(self._roots @ kinks.T, axis=1) > _APART * self._sizes[:, np.newaxis]
+        alone = rest.sum(axis=0) == len(self._roots) - 1
         kinks, roots = kinks[alone], roots[alone]
         _, gradients, hessians = self.derivatives(kinks.T, np.zeros(len(kinks)))
         return Corners.of_norms(kinks, roots, gradients, hessians)
 
 
-class PointTerms:
-    """D(v) = sum_k m_k |w_k|, w_k the velocity of support point k."""
+class PointNormSum:
+    """The dissipation sum_k m_k |w_k|, w_k the velocity of support point k."""
 
     def __init__(self, points: Floats, limits: Floats) -> None:
         """Keep scaled points (n, 2) and limits (n,), coincident points as one."""
@@ -125,18 +119,10 @@ class PointTerms:
         zeros = np.zeros_like(x)
         # Velocities of the points, (2, n, 3) @ twist, and the load of unit forces at them.
         self._jacobians = np.array([[ones, zeros, -y], [zeros, ones, x]]).transpose(0, 2, 1).copy()
-        self._pulls = limits * np.array([[ones, zeros], [zeros, ones], [-y, x]])
+        self._unit_loads = limits * np.array([[ones, zeros], [zeros, ones], [-y, x]])
         self._along_moments = limits * np.array([ones, y, y * y])
         self._beside_moments = limits * np.array([ones, x, x * x])
         self._cross_moments = limits * np.array([ones, x, y, x * y])
-
-    def gradient(self, twists: Floats) -> Floats:
-        """Return the gradient (3, m) of D; a point at rest adds nothing."""
-        loads = (self._loads(part, twists) for part in self._parts(twists.shape[1]))
-        total = next(loads)
-        for each in loads:
-            total += each
-        return total
 
     def _loads(self, part: slice, twists: Floats) -> Floats:
         """Return what some of the points add to the gradient."""
@@ -144,12 +130,15 @@ class PointTerms:
         velocities = self._jacobians[:, part].reshape(-1, 3) @ twists
         velocities = velocities.reshape(2, -1, columns)
         velocities /= self._speeds(velocities[0], velocities[1], twists)
-        pulls = self._pulls[:, :, part].reshape(3, -1)
-        return np.asarray(pulls @ velocities.reshape(-1, columns))
+        unit_loads = self._unit_loads[:, :, part].reshape(3, -1)
+        return np.asarray(unit_loads @ velocities.reshape(-1, columns))
 
     def values_and_normals(self, twists: Floats) -> tuple[Floats, Floats]:
-        """Return D (m,) and its gradient (3, m), as `gradient` does."""
-        gradient = self.gradient(twists)
+        """Return D (m,) and its gradient (3, m); a point at rest adds nothing."""
+        parts = (self._loads(part, twists) for part in self._parts(twists.shape[1]))
+        gradient = next(parts)
+        for each in parts:
+            gradient += each
         return np.einsum("im,im->m", gradient, twists), gradient
 
     def values(self, twists: Floats) -> Floats:
@@ -176,16 +165,16 @@ class PointTerms:
             slowness = np.divide(1.0, speed, out=speed)
             ex *= slowness
             ey *= slowness
-            gradient += self._pulls[:, 0, part] @ ex
-            gradient += self._pulls[:, 1, part] @ ey
+            gradient += self._unit_loads[:, 0, part] @ ex
+            gradient += self._unit_loads[:, 1, part] @ ey
             # A speed's Hessian is [ey^2, -ex ey; -ex ey, ex^2] / speed if nothing is smoothed.
-            bent = slowness * ex
-            across = self._cross_moments[:, part] @ (bent * ey)
-            bent *= ex
-            in_y = self._beside_moments[:, part] @ bent
-            np.multiply(slowness, ey, out=bent)
-            bent *= ey
-            in_x = self._along_moments[:, part] @ bent
+            weight = slowness * ex
+            across = self._cross_moments[:, part] @ (weight * ey)
+            weight *= ex
+            in_y = self._beside_moments[:, part] @ weight
+            np.multiply(slowness, ey, out=weight)
+            weight *= ey
+            in_x = self._along_moments[:, part] @ weight
             if softness is not None:
                 rounding = slowness**3 * softness
                 in_x += self._along_moments[:, part] @ rounding
@@ -199,13 +188,22 @@ class PointTerms:
         hessian[1, 0], hessian[2, 0], hessian[2, 1] = hessian[0, 1], hessian[0, 2], hessian[1, 2]
         return total, gradient, hessian
 
+    def roots(self) -> Floats:
+        """Return R_k with |R_k v| = m_k |w_k|, shape (n, 3, 3); the last row of each is zero."""
+        roots = np.zeros((len(self.limits), 3, 3))
+        roots[:, :2] = self.limits[:, np.newaxis, np.newaxis] * self._jacobians.swapaxes(0, 1)
+        return roots
+
     def corners(self) -> Corners | None:
         """Return the rotations about each support point."""
-        x, y = self.points.T
+        return self.corners_of(np.arange(len(self.limits)))
+
+    def corners_of(self, which: Places) -> Corners | None:
+        """Return the rotations about some of the support points: each costs a sum over all."""
+        x, y = self.points[which].T
         kinks = np.array([y, -x, np.ones_like(x)]).T
         _, gradients, hessians = self.derivatives(kinks.T, np.zeros(len(kinks)))
-        roots = self.limits[:, np.newaxis, np.newaxis] * self._jacobians.swapaxes(0, 1)
-        return Corners.of_norms(kinks, roots, gradients, hessians)
+        return Corners.of_norms(kinks, self.roots()[which, :2], gradients, hessians)
 
     def _parts(self, columns: int) -> Iterator[slice]:
         """Yield slices of points, so short that arrays of them by motions stay in the cache."""

@@ -9,42 +9,52 @@ import numpy as np
 
 from limit_surface_ros.surface.gauges.corners import Corners
 from limit_surface_ros.surface.gauges.power_scale import power_scale
-from limit_surface_ros.surface.linalg import solve_symmetric
+from limit_surface_ros.surface.linalg import NULL_TOLERANCE, solve_symmetric, squared_lengths
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
 
 
-class PowerGauge:
+class PowerSumGauge:
     """g(f) with H(f / g) = 1, H(f) = sum_i (f' A_i f)^p_i and A_i = R_i' R_i."""
 
     def __init__(self, roots: Floats, exponents: Floats) -> None:
         """Keep the factors R_i (k, 3, 3) and the exponents p_i (k,)."""
         self._roots = roots
+        self._stacked_roots = roots.reshape(-1, 3)
         self._forms = np.swapaxes(roots, 1, 2) @ roots
         self._sizes = np.trace(self._forms, axis1=1, axis2=2)[:, np.newaxis]
         self._exponents = exponents
         self._scale = power_scale(exponents)
+        # A matrix of full rank, as `root_of` tells it, has no null space.
+        full = np.abs(roots).any(axis=2).all()
+        self._null = None if full else NULL_TOLERANCE * self._sizes
 
     def values(self, loads: Floats) -> Floats:
-        """Return g (m,)."""
-        images = self._roots @ loads
-        return self._scale.load_factors(np.einsum("kcm,kcm->km", images, images))
+        """Return g (m,); 0 for a load that nothing limits."""
+        return self._scale.load_factors(self._images_and_forms(loads)[1])
 
     def values_and_normals(self, loads: Floats) -> tuple[Floats, Floats]:
         """Return g (m,) and vectors (3, m) along its gradient, of any length.
 
-        A term that does not see a load adds nothing to them.
+        A term adds nothing to the normal of a load in its null space.
         """
-        roots = self._roots.reshape(-1, 3)
-        images = (roots @ loads).reshape(-1, 3, loads.shape[1])
-        forms = np.einsum("kcm,kcm->km", images, images)
+        images, forms = self._images_and_forms(loads)
         values, weights = self._scale.load_factors_and_weights(forms)
         images *= weights[:, np.newaxis]
-        return values, np.asarray(roots.T @ images.reshape(-1, loads.shape[1]))
+        normals = self._stacked_roots.T.dot(images.reshape(-1, images.shape[2]))
+        return values, np.asarray(normals)
+
+    def _images_and_forms(self, loads: Floats) -> tuple[Floats, Floats]:
+        """Return R_i f, shape (k, 3, m), and f' A_i f, shape (k, m)."""
+        images = self._stacked_roots.dot(loads).reshape(-1, 3, loads.shape[1])
+        forms: Floats = np.einsum("kcm,kcm->km", images, images)
+        if self._null is not None:
+            forms[forms <= self._null * squared_lengths(loads)] = 0.0
+        return images, forms
 
     def derivatives(self, loads: Floats, smoothing: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return g, its gradient and its Hessian; see `plane_minimum.Gauge`.
+        """Return g, its gradient and its Hessian; see `Gauge`.
 
         With q_i = f' A_i f and h_i = (q_i / g^2)^p_i, which sum to 1, implicit differentiation of
         sum_i exp(p_i log q_i - 2 p_i t) = 1 gives those of t = log g.
@@ -64,13 +74,13 @@ class PowerGauge:
             safe = np.where(value > 0.0, value, np.inf)
             share = 2.0 * p * np.exp(p * (np.log(np.maximum(value, 1e-300)) - 2.0 * t))
             weight = share / safe
-            pull = root.T @ image
+            part = root.T @ image
             total += share
             second_total += 2.0 * p * share
-            gradient += weight * pull
-            mixed += 2.0 * p * weight * pull
-            bend = (2.0 * p - 2.0) * weight / safe
-            hessian += weight * form[:, :, np.newaxis] + bend * pull[:, np.newaxis] * pull
+            gradient += weight * part
+            mixed += 2.0 * p * weight * part
+            curvature = (2.0 * p - 2.0) * weight / safe
+            hessian += weight * form[:, :, np.newaxis] + curvature * part[:, np.newaxis] * part
         gradient /= total
         across = mixed[:, np.newaxis] * gradient
         hessian -= across + across.swapaxes(0, 1)
@@ -108,7 +118,7 @@ class PowerGauge:
         return forms
 
     def corners(self) -> Corners | None:
-        """Return the loads that one norm, a term of exponent 1/2 and rank two, does not see."""
+        """Return the loads in the null space of one norm, a term of exponent 1/2 and rank two."""
         flat = np.abs(self._roots).any(axis=2).sum(axis=1) == 2
         roots = self._roots[flat & (self._exponents == 0.5), :2]
         axes = np.cross(roots[:, 0], roots[:, 1])
@@ -136,8 +146,8 @@ class PowerGauge:
         ):
             safe = np.where(value > 0.0, value, np.inf)
             weight = 2.0 * p * np.power(safe, p - 1.0)
-            pull = root.T @ image
-            gradient += weight * pull
-            bend = (2.0 * p - 2.0) / safe * pull[:, np.newaxis] * pull
-            hessian += weight * (form[:, :, np.newaxis] + bend)
+            part = root.T @ image
+            gradient += weight * part
+            curvature = (2.0 * p - 2.0) / safe * part[:, np.newaxis] * part
+            hessian += weight * (form[:, :, np.newaxis] + curvature)
         return Corners.of_norms(axes * scale[:, np.newaxis], roots, gradient, hessian)

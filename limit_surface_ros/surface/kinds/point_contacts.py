@@ -3,33 +3,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from limit_surface_ros.checks import as_floats, as_positive
+from limit_surface_ros.checks import as_floats
 from limit_surface_ros.errors import GeometryError, RangeError, ShapeError
-from limit_surface_ros.surface.gauges.norm_sum import PointTerms
-from limit_surface_ros.surface.kinds.dissipation import Dissipation
-from limit_surface_ros.surface.kinds.dissipation_surface import DissipationSurface
+from limit_surface_ros.surface.base import FileArray, LimitSurface
+from limit_surface_ros.surface.gauges.norm_sum import PointNormSum
+from limit_surface_ros.surface.gauges.scalar import NormSumScalar
+from limit_surface_ros.surface.kinds.dissipation import SUM_OF_CONVEX_SETS, Dissipation
 from limit_surface_ros.surface.scaling import Scaling
-from limit_surface_ros.surface.support.many_points import ManyPointsInverse
-from limit_surface_ros.surface.support.tabulated import TabulatedInverse
+from limit_surface_ros.surface.shape import DissipationShape
+from limit_surface_ros.surface.support.dissipation_solver import FEW_TERMS, points_solver
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.support.solvers import Inverse
-
-# Points from which their sums are the cost of a twist, and single precision pays.
-_MANY = 64
-# Scaled distance of the points from the reference point beyond which it does not.
-_FAR = 10.0
+    from limit_surface_ros.surface.support.solvers import SupportSolver
 
 
 @dataclass(frozen=True, eq=False)
-class PointContacts(DissipationSurface):
+class PointContacts(LimitSurface):
     """The limit surface of support points with isotropic Coulomb friction.
 
     A point p_k that moves with w_k resists with m_k w_k / |w_k|; a point at rest resists with any
@@ -49,13 +45,18 @@ class PointContacts(DissipationSurface):
     """
 
     kind: ClassVar[str] = "point_contacts"
+    arrays: ClassVar[tuple[FileArray, ...]] = (
+        FileArray("points", (None, 2)),
+        FileArray("friction_limits", ("points",), at_least=0.0),
+    )
+    wrench_is_closed: ClassVar[bool] = True
 
     points: Floats
     friction_limits: Floats
     scaling: Scaling = field(default_factory=Scaling)
 
     def __post_init__(self) -> None:
-        """Check the arrays and scale them."""
+        """Check the arrays."""
         points = as_floats("points", self.points).copy()
         limits = as_floats("friction_limits", self.friction_limits).copy()
         if points.size == 0:
@@ -76,17 +77,20 @@ class PointContacts(DissipationSurface):
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "friction_limits", limits)
 
-    def with_friction_force(self, friction_force: float) -> PointContacts:
-        """Return the same body under another weight; see `LimitSurface`.
+    @property
+    def size(self) -> int:
+        """How many numbers define the shape: two coordinates and a limit for each point."""
+        return 3 * len(self.points)
 
-        Every friction limit grows in the ratio of the friction force scales.
-        """
-        force = as_positive("friction_force", friction_force)
-        return PointContacts(
-            self.points,
-            self.friction_limits * (force / self.scaling.friction_force),
-            replace(self.scaling, friction_force=force),
-        )
+    @property
+    def convex_because(self) -> str:
+        """Why the surface is convex whatever its points are."""
+        return SUM_OF_CONVEX_SETS
+
+    @property
+    def contact_points(self) -> tuple[Floats, Floats]:
+        """The support points (n, 2) [m] and their friction limits (n,) [N]."""
+        return self.points, self.friction_limits
 
     def dissipation(self) -> Dissipation:
         """Return the same surface as a `Dissipation` with one matrix of rank two per point."""
@@ -102,17 +106,27 @@ class PointContacts(DissipationSurface):
         forms = np.array([[ones, zeros, -y], [zeros, ones, x], [-y, x, x * x + y * y]])
         return np.asarray(np.moveaxis(forms * limits**2, -1, 0))
 
-    @cached_property
-    def _terms(self) -> PointTerms:
-        return PointTerms(
-            self.points / self.scaling.characteristic_length,
-            self.friction_limits / self.scaling.friction_force,
+    def _under(self, scaling: Scaling, factor: float) -> dict[str, Any]:
+        limits = self.friction_limits * factor
+        limits.setflags(write=False)
+        return {"points": self.points, "friction_limits": limits, "scaling": scaling}
+
+    def _new_shape(self) -> _PointsShape:
+        points = self.points / self.scaling.characteristic_length
+        return _PointsShape(
+            PointNormSum(points, self.friction_limits / self.scaling.friction_force)
         )
 
+
+class _PointsShape(DissipationShape):
+    """The shape of support points."""
+
+    def __init__(self, gauge: PointNormSum) -> None:
+        few = len(gauge.limits) <= FEW_TERMS
+        super().__init__(gauge, NormSumScalar(gauge.roots()) if few else None)
+        self._points = gauge
+
     @cached_property
-    def _inverse(self) -> Inverse:
-        terms = self._terms
-        if len(terms.points) < _MANY or np.abs(terms.points).max() > _FAR:
-            return super()._inverse
-        many = ManyPointsInverse(terms.points, terms.limits, self._inverse_of_any)
-        return TabulatedInverse(many, many)
+    def solver(self) -> SupportSolver:
+        """Finds the motions of loads."""
+        return points_solver(self._points)

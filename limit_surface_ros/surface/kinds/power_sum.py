@@ -3,46 +3,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from math import sqrt
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from limit_surface_ros.checks import as_floats, as_vectors
 from limit_surface_ros.errors import RangeError, ShapeError
-from limit_surface_ros.surface.base import LimitSurface
-from limit_surface_ros.surface.gauges.one_load import (
-    gauge_of_one,
-    norm_gradient_of_one,
-    normal_and_gauge_of_one,
-    one_load_terms,
-)
-from limit_surface_ros.surface.gauges.one_power_sum import OnePowerSum
-from limit_surface_ros.surface.gauges.one_twist import wrench_of_one
-from limit_surface_ros.surface.gauges.power_scale import PowerScale, power_scale
-from limit_surface_ros.surface.linalg import (
-    NULL_TOLERANCE,
-    as_psd_matrices,
-    of_unit_length,
-    root_of,
-    squared_lengths,
-)
+from limit_surface_ros.surface.base import FileArray, LimitSurface
+from limit_surface_ros.surface.linalg import as_psd_matrices, null_space, of_unit_length, root_of
 from limit_surface_ros.surface.scaling import Scaling
-from limit_surface_ros.surface.support.power_sum import power_sum_inverse
+from limit_surface_ros.surface.shape import GaugeShape
+from limit_surface_ros.surface.support.power_sum_solver import (
+    gauge_of,
+    power_sum_solver,
+    scalar_gauge_of,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.gauges.one_load import Term, Vector
-    from limit_surface_ros.surface.support.solvers import Inverse
+    from limit_surface_ros.surface.gauges.gauge import Vector
+    from limit_surface_ros.surface.support.solvers import SupportSolver
 
-# Part of a twist along a load without limit, above which its power is infinite.
+# Part of a motion along a load without limit, above which its power is infinite.
 _FREE = 1e-12
-# Relative eigenvalue below which nothing limits a load.
-_NO_LIMIT = 1e-15
 
 
 def thesis_exponents(terms: int) -> Floats:
@@ -80,14 +67,17 @@ class PowerSum(LimitSurface):
     """
 
     kind: ClassVar[str] = "power_sum"
+    arrays: ClassVar[tuple[FileArray, ...]] = (
+        FileArray("exponents", ("terms",)),
+        FileArray("matrices", ("terms", 3, 3)),
+    )
 
     matrices: Floats
     exponents: Floats
     scaling: Scaling = field(default_factory=Scaling)
-    _roots: Floats = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Check the arrays and factor the matrices."""
+        """Check the arrays."""
         matrices = as_psd_matrices("matrix", self.matrices)
         exponents = as_floats("exponents", self.exponents).copy()
         if exponents.shape != (len(matrices),):
@@ -100,7 +90,6 @@ class PowerSum(LimitSurface):
         exponents.setflags(write=False)
         object.__setattr__(self, "matrices", matrices)
         object.__setattr__(self, "exponents", exponents)
-        object.__setattr__(self, "_roots", np.array([root_of(matrix) for matrix in matrices]))
 
     @classmethod
     def thesis(cls, matrices: ArrayLike, scaling: Scaling | None = None) -> PowerSum:
@@ -124,10 +113,6 @@ class PowerSum(LimitSurface):
         array = as_floats("matrices", matrices)
         return cls(array, np.full(len(array), 0.5), scaling or Scaling())
 
-    def with_friction_force(self, friction_force: float) -> PowerSum:
-        """Return the same body under another weight; see `LimitSurface`."""
-        return replace(self, scaling=replace(self.scaling, friction_force=friction_force))
-
     def value(self, load: ArrayLike) -> Floats:
         """Return H: below 1 inside the surface, 1 on it.
 
@@ -139,8 +124,8 @@ class PowerSum(LimitSurface):
         """
         array = as_vectors("load", load)
         columns = array.reshape(-1, 3).T
-        forms = self._forms(self._images(columns), columns)
-        values = (forms ** self.exponents[:, np.newaxis]).sum(axis=0)
+        forms = np.einsum("im,kij,jm->km", columns, self.matrices, columns)
+        values = (np.maximum(forms, 0.0) ** self.exponents[:, np.newaxis]).sum(axis=0)
         return np.asarray(values.reshape(array.shape[:-1]))[()]
 
     def gradient(self, load: ArrayLike) -> Floats:
@@ -157,144 +142,94 @@ class PowerSum(LimitSurface):
         """
         array = as_vectors("load", load)
         columns = array.reshape(-1, 3).T
-        images = self._images(columns)
-        forms = self._forms(images, columns)
+        images = self.matrices @ columns
+        forms = np.einsum("im,kim->km", columns, images)
         exponents = self.exponents[:, np.newaxis]
         weights = np.power(forms, exponents - 1.0, out=np.zeros_like(forms), where=forms > 0.0)
-        images *= (2.0 * exponents * weights)[:, np.newaxis]
-        gradient = self._stacked_roots.T @ images.reshape(-1, images.shape[2])
-        return np.asarray(gradient.T.reshape(array.shape))
+        gradient = np.einsum("km,kim->mi", 2.0 * exponents * weights, images)
+        return np.asarray(gradient.reshape(array.shape))
 
-    @cached_property
-    def _one_load_terms(self) -> list[Term]:
-        return one_load_terms(self._roots, self.exponents, self.scaling.wrench_unit)
+    @property
+    def size(self) -> int:
+        """How many numbers define the shape: six for each symmetric matrix."""
+        return 6 * len(self.matrices)
 
-    @cached_property
-    def _is_norm(self) -> bool:
-        """Whether the load factor is the plain sum of |R_i f|."""
-        return len(self.matrices) == 1 or bool((self.exponents == 0.5).all())
+    @property
+    def convex_because(self) -> str | None:
+        """Why the surface is convex whatever its matrices are; None if they decide."""
+        if len(self.matrices) == 1:
+            return "it is an ellipsoid"
+        if self.exponents.min() >= 0.5:
+            return "every exponent is at least 1/2, so that every term is convex"
+        return None
 
-    @cached_property
-    def _scale(self) -> PowerScale:
-        return power_scale(self.exponents)
+    def _new_shape(self) -> _PowerSumShape:
+        return _PowerSumShape(
+            np.array([root_of(matrix) for matrix in self.matrices]), self.exponents
+        )
 
-    @cached_property
-    def _stacked_roots(self) -> Floats:
-        """The R_i above each other, shape (3 k, 3)."""
-        return self._roots.reshape(-1, 3)
 
-    def _load_factor_of_one(self, wrench: Vector) -> float | None:
-        if self._is_norm:
-            found = self._twist_and_load_factor_of_one(wrench)
-            return None if found is None else found[1]
-        return gauge_of_one(self._one_load_terms, wrench)
+class _PowerSumShape(GaugeShape):
+    """The shape of sum_i |R_i f|^(2 p_i) = 1."""
 
-    def _twist_of_one(self, wrench: Vector) -> Vector | None:
-        found = self._twist_and_load_factor_of_one(wrench)
-        return None if found is None else found[0]
+    def __init__(self, roots: Floats, exponents: Floats) -> None:
+        super().__init__(gauge_of(roots, exponents), scalar_gauge_of(roots, exponents))
+        self._roots = roots
+        self._exponents = exponents
 
-    def _twist_and_load_factor_of_one(self, wrench: Vector) -> tuple[Vector, float] | None:
-        # The terms take physical wrenches, so that the normal comes as a physical twist.
-        if self._is_norm:
-            gradient = norm_gradient_of_one(self._one_load_terms, wrench)
-            if gradient is None:
-                return None
-            x, y, z = gradient
-            factor = x * wrench[0] + y * wrench[1] + z * wrench[2]
-        else:
-            found = normal_and_gauge_of_one(self._one_load_terms, wrench)
-            if found is None:
-                return None
-            (x, y, z), factor = found
-        turn = z * self.scaling.characteristic_length
-        length = sqrt(x * x + y * y + turn * turn)
-        return (x / length, y / length, z / length), factor
+    def motions_and_load_factors(self, loads: Floats) -> tuple[Floats, Floats]:
+        """Return unit motions and load factors; see `Shape`.
 
-    @cached_property
-    def _one_gauge(self) -> OnePowerSum:
-        return OnePowerSum(self._roots, self.exponents)
-
-    def _wrench_of_one(self, twist: Vector) -> Vector | None:
-        if len(self._free):
-            return None
-        return wrench_of_one(self._one_gauge, self._inverse, self.scaling, twist)
-
-    def _load_factors(self, loads: Floats) -> Floats:
-        forms = self._forms(self._images(loads), loads)
-        if self._is_norm:
-            return np.asarray(np.sqrt(forms).sum(axis=0))
-        return self._scale.load_factors(forms)
-
-    def _twists(self, loads: Floats) -> Floats:
-        return self._twists_and_load_factors(loads)[0]
-
-    def _twists_and_load_factors(self, loads: Floats) -> tuple[Floats, Floats]:
-        images = self._images(loads)
-        forms = self._forms(images, loads)
-        seen = np.count_nonzero(forms) == forms.size
-        if not seen and not forms.any(axis=0).all():
-            unlimited = loads[:, ~forms.any(axis=0)][:, 0].tolist()
+        Raises:
+            RangeError: Nothing limits a load.
+        """
+        factors, normals = self._gauge.values_and_normals(loads)
+        if np.count_nonzero(factors) < len(factors):
+            unlimited = loads[:, factors == 0.0][:, 0].tolist()
             raise RangeError(
                 "this surface has no limit in the direction of a wrench: friction resists any "
                 f"amount of it, scaled direction {unlimited}"
             )
-        if self._is_norm:
-            norms = np.sqrt(forms)
-            factors = np.add.reduce(norms)
-            if not seen:
-                # A term that does not see the load adds nothing to its normal.
-                norms[norms == 0.0] = np.inf
-            images /= norms[:, np.newaxis]
-        else:
-            factors, weights = self._scale.load_factors_and_weights(forms)
-            images *= weights[:, np.newaxis]
-        normals = self._stacked_roots.T.dot(images.reshape(-1, images.shape[2]))
         return of_unit_length(normals), factors
 
-    def _loads(self, twists: Floats) -> Floats:
+    def load_factor_and_motion_scalar(self, load: Vector) -> tuple[float, Vector] | None:
+        """Return load factor and motion of one load; see `Shape`."""
+        found = self._scalar.value_and_normal(load)
+        return found if found is not None and found[0] > 0.0 else None
+
+    def loads(self, motions: Floats) -> Floats:
+        """Return the loads of most power; see `Shape`.
+
+        Raises:
+            RangeError: The power of a motion is infinite.
+        """
         if len(self._free):
-            unlimited = np.abs(self._free @ twists).max(axis=0) > _FREE * np.abs(twists).max(
-                axis=0
-            )
-            if unlimited.any():
+            powers = np.abs(self._free @ motions)
+            infinite = (powers > _FREE * (np.abs(self._free) @ np.abs(motions))).any(axis=0)
+            if infinite.any():
                 raise RangeError(
                     "this surface has no limit to the load of a twist: the power of "
-                    f"scaled twist {twists[:, unlimited][:, 0].tolist()} is infinite"
+                    f"scaled twist {motions[:, infinite][:, 0].tolist()} is infinite"
                 )
-        return self._inverse.solve(twists)[0]
+        return super().loads(motions)
+
+    def load_scalar(self, motion: Vector) -> Vector | None:
+        """Return the load of most power for one motion; see `Shape`."""
+        return None if len(self._free) else super().load_scalar(motion)
 
     @cached_property
     def _free(self) -> Floats:
         """Orthonormal loads that nothing limits, shape (q, 3)."""
-        size, vectors = np.linalg.eigh(sum(m / np.trace(m) for m in self.matrices))
-        free: Floats = vectors[:, size <= _NO_LIMIT * size[-1]].T
-        return free
+        sizes = np.sqrt(np.square(self._roots).sum(axis=(1, 2), keepdims=True))
+        return null_space(self._roots / sizes)
 
     @cached_property
-    def _inverse(self) -> Inverse:
+    def solver(self) -> SupportSolver:
+        """Finds the loads of most power."""
         roots = self._roots
         if len(self._free):
             # A limit within one term keeps the answer at zero along what nothing limits.
-            bounded = self.matrices[0] + np.trace(self.matrices[0]) * self._free.T @ self._free
-            roots = np.array([root_of(bounded), *roots[1:]])
-        return power_sum_inverse(roots, self.exponents)
-
-    def _images(self, columns: Floats) -> Floats:
-        """Return R_i f, shape (k, 3, m), of columns (3, m)."""
-        images: Floats = self._stacked_roots.dot(columns)
-        return images.reshape(-1, 3, columns.shape[1])
-
-    @cached_property
-    def _blind(self) -> Floats | None:
-        """Forms of unit loads that count as zero, shape (k, 1); None if all matrices see all."""
-        if np.abs(self._roots).any(axis=2).all():
-            return None
-        sizes: Floats = np.square(self._roots).sum(axis=(1, 2))[:, np.newaxis]
-        return NULL_TOLERANCE * sizes
-
-    def _forms(self, images: Floats, loads: Floats) -> Floats:
-        """Return f' A_i f, shape (k, m), from the images R_i f and the loads f."""
-        forms: Floats = np.einsum("kcm,kcm->km", images, images)
-        if self._blind is not None:
-            forms[forms <= self._blind * squared_lengths(loads)] = 0.0
-        return forms
+            size = np.sqrt(np.square(roots[0]).sum())
+            bounded = np.linalg.qr(np.concatenate([roots[0], size * self._free]))[1]
+            roots = np.array([bounded, *roots[1:]])
+        return power_sum_solver(roots, self._exponents)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Loads to twists for hundreds of support points: Newton's method, single precision then double.
+"""Motions under loads for hundreds of support points: Newton's method in two precisions.
 
 Sums over the points are the cost. With the squares of velocities and all moments as products of
-small matrices, a step in single precision costs a seventh of one in `dissipation_terms`; steps in
-double need no more than a gradient, and take the curvature from the last single one. Whatever does
-not settle, as beside a support point, is left to the inverse for any sum.
+small matrices, a step in single precision costs a seventh of one with `PointNormSum`; steps in
+double need no more than a gradient, and take the curvature from the last single one. What does not
+settle, as beside a support point, is left to `ConvexNewton` with the corner of that point alone:
+all corners of n points would cost n^2.
 """
 
 from __future__ import annotations
@@ -15,12 +16,14 @@ import numpy as np
 
 from limit_surface_ros.surface.linalg import of_unit_length
 from limit_surface_ros.surface.support.newton import newton_moves, plane_basis
+from limit_surface_ros.surface.support.solvers import SupportSolver
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from limit_surface_ros.checks import Bools, Floats
-    from limit_surface_ros.surface.support.solvers import ConvexInverse
+    from limit_surface_ros.checks import Bools, Floats, Places
+    from limit_surface_ros.surface.gauges.norm_sum import PointNormSum
+    from limit_surface_ros.surface.support.solvers import ConvexNewton
 
 # Points and motions in one block, of which two arrays stay in the processor's cache.
 _POINTS = 1024
@@ -32,52 +35,54 @@ _COARSE_STEPS = 6
 _LAST_STEP = 1e-8
 _SINE = 1e-9
 _STEPS = 4
+# Loads whose hard ones are solved together, with the corners of the points beside their motions.
+_HARD_AT_ONCE = 1024
 # Squares of velocities, relative to the largest ones, below which rounding would tell.
 _CLEAR = 1e-6
 _CLEAR_SINGLE = 2e-7
 
 
-class ManyPointsInverse:
-    """Twists along loads, and their load factors, for D(v) = sum_k m_k |w_k| over many points."""
+class ManyPoints(SupportSolver):
+    """Motions under loads, and the loads' factors, for D(v) = sum_k m_k |w_k| over many points."""
 
-    def __init__(self, points: Floats, limits: Floats, general: ConvexInverse) -> None:
+    def __init__(self, gauge: PointNormSum, general: ConvexNewton) -> None:
         """Keep the moments of the points.
 
         Args:
-            points: Scaled, shape (n, 2).
-            limits: m_k, scaled, shape (n,).
-            general: The inverse for the same points, for starts and for hard loads.
+            gauge: D, of points about the origin that are about one apart.
+            general: The solver for the same points, for starts and for hard loads.
         """
+        self._gauge = gauge
         self._general = general
-        x, y = points.T
+        limits = gauge.limits
+        x, y = gauge.points.T
         squares = np.array([np.ones_like(x), x, y, x * x + y * y])
         products = np.array([np.ones_like(x), x, y, x * x, x * y, y * y])
         self._reach = max(1.0, float(squares[3].max()))
         self._squares = np.ascontiguousarray(squares.T)
-        self._pulls = limits * squares
+        self._weights = limits * squares
         self._single_squares = self._squares.astype(np.float32)
-        self._single_pulls = self._pulls.astype(np.float32)
-        self._single_bends = (limits * products).astype(np.float32)
+        self._single_weights = self._weights.astype(np.float32)
+        self._single_curvatures = (limits * products).astype(np.float32)
 
     def solve(self, normals: Floats) -> tuple[Floats, Floats]:
-        """Return the twists (3, m) of unit D along loads (3, m), and the loads' factors (m,).
-
-        Raises:
-            SolverError: A twist could not be certified.
-        """
+        """Return the motions of loads on D = 1, and their factors; see `SupportSolver`."""
         units = of_unit_length(normals)
         basis = plane_basis(units)
         points, hessians = self._approach(units, basis)
         points, values, settled = self._settle(units, basis, points, hessians)
         points /= values
-        hard = np.flatnonzero(~settled)
-        if len(hard):
-            points[:, hard] = self._general.solve(units[:, hard])[0]
+        for start in range(0, units.shape[1], _HARD_AT_ONCE):
+            hard = start + np.flatnonzero(~settled[start : start + _HARD_AT_ONCE])
+            if len(hard):
+                corners = self._gauge.corners_of(self._nearest_points(points[:, hard]))
+                points[:, hard] = self._general.solve_beside(units[:, hard], corners)[0]
         return points, (normals * points).sum(axis=0)
 
-    def starts_of_one(self, _normal: Floats) -> Floats:
-        """Return no start: beside a support point none leads smoothly to the answer."""
-        return np.empty((0, 3))
+    def _nearest_points(self, twists: Floats) -> Places:
+        """Return which support points are the slowest in some of the motions (3, m)."""
+        speeds = self._squares @ _square_weights(twists)
+        return np.asarray(np.unique(speeds.argmin(axis=0)))
 
     def values_and_normals(self, twists: Floats) -> tuple[Floats, Floats]:
         """Return D (m,) and its gradients (3, m), NaN where a point is near to rest."""
@@ -140,14 +145,14 @@ class ManyPointsInverse:
                 clear[motions] &= speed.min(axis=0) > least
                 np.maximum(speed, least, out=speed)
             np.sqrt(speed, out=speed)
-            sums[:, motions] += self._pulls[:, part] @ np.divide(1.0, speed, out=speed)
+            sums[:, motions] += self._weights[:, part] @ np.divide(1.0, speed, out=speed)
         return _gradient(twists, sums), clear
 
     def _single_derivatives(self, twists: Floats) -> tuple[Floats, Floats]:
         """Return gradients (3, m) and Hessians (3, 3, m) of D, computed in single precision."""
         weights = _square_weights(twists).astype(np.float32)
         sums = np.zeros_like(weights)
-        bends = np.zeros((6, twists.shape[1]), dtype=np.float32)
+        curvatures = np.zeros((6, twists.shape[1]), dtype=np.float32)
         least = np.float32(_CLEAR_SINGLE * self._reach)
         cubes = np.empty(_POINTS * _MOTIONS, dtype=np.float32)
         for motions, part, slowness in self._blocks(twists.shape[1], np.float32):
@@ -156,13 +161,13 @@ class ManyPointsInverse:
             slowness += least
             np.sqrt(slowness, out=slowness)
             np.divide(np.float32(1.0), slowness, out=slowness)
-            sums[:, motions] += self._single_pulls[:, part] @ slowness
+            sums[:, motions] += self._single_weights[:, part] @ slowness
             cube = cubes[: slowness.size].reshape(slowness.shape)
             np.multiply(slowness, slowness, out=cube)
             cube *= slowness
-            bends[:, motions] += self._single_bends[:, part] @ cube
+            curvatures[:, motions] += self._single_curvatures[:, part] @ cube
         return _gradient(twists, sums.astype(np.float64)), _hessian(
-            twists, bends.astype(np.float64)
+            twists, curvatures.astype(np.float64)
         )
 
     def _blocks(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Least value of a gauge over a plane: the one optimisation behind both maps' inverses.
+"""Least value of a gauge over a plane: the one optimisation behind all support points.
 
 A gauge g is positive and homogeneous of degree one. Where n.x = 1 is held and g(x) is least, the
 gradient of g is parallel to n and x / g(x) is the point of g = 1 with the largest n.x. With the
@@ -8,7 +8,7 @@ dissipation as gauge this takes loads to twists, with a surface's load factor tw
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from typing import TypeAlias
 
     from limit_surface_ros.checks import Bools, Floats
+    from limit_surface_ros.surface.gauges.gauge import Gauge
 
     Derivatives: TypeAlias = tuple[Floats, Floats, Floats]
 
@@ -34,23 +35,6 @@ _HALVINGS = 40
 # Relative smoothing of the kinks where Newton's method alone does not settle.
 _RATIO = 0.2
 _SMOOTHINGS = 0.3 * _RATIO ** np.arange(18)
-
-
-class Gauge(Protocol):
-    """A positive function, homogeneous of degree one, smooth but for kinks."""
-
-    def values(self, points: Floats, /) -> Floats:
-        """Return the values (m,) at points (3, m)."""
-        ...
-
-    def derivatives(self, points: Floats, smoothing: Floats, /) -> tuple[Floats, Floats, Floats]:
-        """Return the values (m,), gradients (3, m) and Hessians (3, 3, m).
-
-        Args:
-            points: Shape (3, m).
-            smoothing: Relative size to which kinks are rounded, shape (m,); may be 0.
-        """
-        ...
 
 
 def certain_minimum(
@@ -159,19 +143,21 @@ def newton_moves(
     rising = along > 0.0
     sines = np.hypot(across_first, across_second) / np.where(rising, along, 1.0)
     sines[~rising] = np.inf
-    bent_first = np.einsum("ijm,jm->im", hessians, first)
-    bent_second = np.einsum("ijm,jm->im", hessians, second)
-    a = (first * bent_first).sum(axis=0)
-    b = (first * bent_second).sum(axis=0)
-    c = (second * bent_second).sum(axis=0)
+    by_first = np.einsum("ijm,jm->im", hessians, first)
+    by_second = np.einsum("ijm,jm->im", hessians, second)
+    a = (first * by_first).sum(axis=0)
+    b = (first * by_second).sum(axis=0)
+    c = (second * by_second).sum(axis=0)
     # Where the gauge is flat the answer is not unique and any step will do.
     size = np.sqrt((gradients * gradients).sum(axis=0) / (points * points).sum(axis=0))
     mean, spread = 0.5 * (a + c), np.hypot(0.5 * (a - c), b)
     ridge = 1e-15 * spread + 1e-13 * size
-    # Where it bends down, the bend counts as one up.
-    down = np.flatnonzero(mean < spread * (1.0 - 1e-10))
-    if len(down):
-        a[down], b[down], c[down] = _absolute(a[down], b[down], c[down], mean[down], spread[down])
+    # Negative curvature is replaced by its absolute value (modified Newton).
+    negative = np.flatnonzero(mean < spread * (1.0 - 1e-10))
+    if len(negative):
+        a[negative], b[negative], c[negative] = _absolute(
+            *(each[negative] for each in (a, b, c, mean, spread))
+        )
     a += ridge
     c += ridge
     determinant = np.maximum(a * c - b * b, ridge * (a + c))

@@ -1,22 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Points of most power on a surface given by its gauge: the inverse of its normals.
+"""Support points: where on a surface n.x is largest, for any normal n.
 
-Where the surface is convex one climb from a good start is enough; a normal in the cone of a
-corner is met exactly, without climbing. Elsewhere all peaks of a table of starts are climbed.
+With loads as points and motions as normals these are the loads of maximum dissipation, and the
+other way round the motions that loads cause. Where the surface is convex, one descent from a good
+start is enough, and a normal in the cone of a corner is met exactly. Elsewhere all peaks among a
+table of starts are climbed.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limit_surface_ros.surface.gauges.gauge import BoundedGauge
 from limit_surface_ros.surface.linalg import even_directions, of_unit_length
-from limit_surface_ros.surface.support.newton import Gauge, certain_minimum, plane_minimum
+from limit_surface_ros.surface.support.newton import certain_minimum, plane_minimum
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Bools, Floats, Places
     from limit_surface_ros.surface.gauges.corners import Corners
+    from limit_surface_ros.surface.gauges.gauge import Gauge, Vector
 
 # Neighbours of a start among which it must be best to be a peak.
 _NEIGHBOURS = 8
@@ -33,33 +38,35 @@ _FRAME_POINTS = 300
 _FRAME_STEPS = 6
 
 
-class Inverse(Protocol):
-    """Finds, for vectors n, the points of a surface with the largest n.x."""
+class SupportSolver(ABC):
+    """Finds, for normals n, the points of a surface with the largest n.x."""
 
+    @abstractmethod
     def solve(self, normals: Floats) -> tuple[Floats, Floats]:
-        """Return the points (3, m) for vectors (3, m), none zero, and the largest n.x (m,)."""
-        ...
+        """Return the points (3, m) for normals (3, m), none zero, and the largest n.x (m,).
 
-    def starts_of_one(self, normal: Floats) -> Floats:
-        """Return points (s, 3) that lead smoothly to the answer for one vector (3,), if any do."""
-        ...
+        Raises:
+            SolverError: A point could not be certified.
+        """
 
+    def solve_scalar(self, _normal: Vector) -> Vector | None:
+        """Return the point for one normal in plain floats; None leaves it to `solve`."""
+        return None
 
-@runtime_checkable
-class BoundedGauge(Gauge, Protocol):
-    """A gauge with an ellipsoid inside its surface through each point of it."""
-
-    def ellipsoids(self, points: Floats) -> Floats:
-        """Return P (m, 3, 3): the ellipsoids x' P^-1 x = 1 touch the surface at points (3, m)."""
-        ...
-
-    def along_ellipsoids(self, points: Floats, normals: Floats) -> Floats:
-        """Return P n (3, m) for normals n (3, m), with P as `ellipsoids` gives it."""
-        ...
+    def expect(self, _count: float) -> None:  # noqa: B027, most solvers have nothing to make
+        """Make now what pays if so many normals come; see `tabulated`."""
 
 
-class ConvexInverse:
-    """Points x of g(x) = 1 with the largest n.x, for a convex gauge g."""
+class StartedSolver(SupportSolver):
+    """A solver that can tell where it would start from."""
+
+    @abstractmethod
+    def starts_of(self, normal: Floats) -> Floats:
+        """Return points (s, 3) of which the best leads to the answer for one normal (3,)."""
+
+
+class ConvexNewton(StartedSolver):
+    """Support points of g(x) = 1 for a convex gauge g, by Newton's method."""
 
     def __init__(self, gauge: Gauge, directions: Floats, corners: Corners | None = None) -> None:
         """Prepare the table of starts.
@@ -70,35 +77,35 @@ class ConvexInverse:
             corners: Corners of the surface, if it has any.
         """
         self._gauge = gauge
-        self.corners = corners
+        self._corners = corners
         values, gradients, hessians = gauge.derivatives(directions, np.zeros(directions.shape[1]))
         self._starts = directions / values
         self._gradients = gradients
         self._hessians = hessians * values
 
     def solve(self, normals: Floats) -> tuple[Floats, Floats]:
-        """Return the points (3, m) of most power for vectors (3, m), and that power (m,).
+        """Return support points and powers; see `SupportSolver`."""
+        return self.solve_beside(normals, self._corners)
 
-        Raises:
-            SolverError: A point could not be certified.
-        """
+    def solve_beside(self, normals: Floats, corners: Corners | None) -> tuple[Floats, Floats]:
+        """Return what `solve` does, with other corners: those that may be near to the answers."""
         units = of_unit_length(normals)
-        if self.corners is None:
-            points = self._climb(units)
+        if corners is None:
+            points = self._descend(units)
         else:
-            distance, points = self.corners.nearest(units)
+            distance, points = corners.nearest(units)
             smooth = np.flatnonzero(distance > 1.0)
             if len(smooth):
                 near = points.take(smooth, axis=1)
                 beside = distance[smooth] < _BESIDE
-                points[:, smooth] = self._climb(units.take(smooth, axis=1), near, beside)
+                points[:, smooth] = self._descend(units.take(smooth, axis=1), near, beside)
         points /= self._gauge.values(points)
         return points, (normals * points).sum(axis=0)
 
-    def _climb(
+    def _descend(
         self, units: Floats, near: Floats | None = None, beside: Bools | None = None
     ) -> Floats:
-        """Return the points of most power for unit vectors (3, m), from the better of two starts.
+        """Return the support points for unit vectors (3, m), from the better of two starts.
 
         Args:
             units: The vectors.
@@ -125,19 +132,13 @@ class ConvexInverse:
             self._hessians.take(which, axis=2),
         )
 
-    def starts_of_one(self, normal: Floats) -> Floats:
-        """Return the start for one vector (3,), none where a corner might be the answer."""
-        if self.corners is not None:
-            return np.empty((0, 3))
-        return self.start_of_one(normal)[np.newaxis]
-
-    def start_of_one(self, normal: Floats) -> Floats:
-        """Return the start (3,) with the most power of the table for one vector (3,)."""
-        return np.asarray(self._starts[:, np.argmax(normal @ self._starts)])
+    def starts_of(self, normal: Floats) -> Floats:
+        """Return the start with the most power; see `StartedSolver`."""
+        return np.asarray(self._starts[:, np.argmax(normal @ self._starts)])[np.newaxis]
 
 
-class PeakInverse:
-    """Points x of g(x) = 1 with the largest n.x, for a gauge that need not be convex.
+class PeakSearch(StartedSolver):
+    """Support points of g(x) = 1 for a gauge g that need not be convex.
 
     The surface holds an ellipsoid through each point of a table. How far these reach along n is
     known at once, and the peaks among them are climbed.
@@ -158,7 +159,7 @@ class PeakInverse:
         self._neighbours = np.ascontiguousarray(nearest.T)
 
     def solve(self, normals: Floats) -> tuple[Floats, Floats]:
-        """Return the points (3, m) of most power for vectors (3, m), and that power (m,)."""
+        """Return support points and powers; see `SupportSolver`."""
         units = of_unit_length(normals)
         found = [
             self._peaks(units[:, start : start + _TABLE_COLUMNS])
@@ -178,8 +179,8 @@ class PeakInverse:
         summits = points.take(best, axis=1)
         return summits, (normals * summits).sum(axis=0)
 
-    def starts_of_one(self, normal: Floats) -> Floats:
-        """Return the starts (s, 3) that are worth climbing for one vector (3,)."""
+    def starts_of(self, normal: Floats) -> Floats:
+        """Return the starts that are worth climbing; see `StartedSolver`."""
         unit = normal / np.sqrt(normal @ normal)
         reach = self._ellipsoids.reshape(-1, 9) @ np.multiply.outer(unit, unit).ravel()
         high = reach >= _WORTH**2 * reach.max()
@@ -216,22 +217,35 @@ class PeakInverse:
         return points / self._gauge.values(points)
 
 
-class FramedInverse:
-    """An inverse in other axes, in which the surface is about as wide in all directions."""
+class InFrame(SupportSolver):
+    """A solver in other axes, in which the surface is about as wide in all directions."""
 
-    def __init__(self, frame: Floats, inverse: Inverse) -> None:
-        """Keep the frame F, points x = F y, and the inverse in y."""
+    def __init__(self, frame: Floats, solver: SupportSolver) -> None:
+        """Keep the frame F, points x = F y, and the solver in y."""
         self._frame = frame
-        self._inverse = inverse
+        self._rows: list[list[float]] = frame.tolist()
+        self._solver = solver
 
     def solve(self, normals: Floats) -> tuple[Floats, Floats]:
-        """Return the points (3, m) of most power for vectors (3, m), and that power (m,)."""
-        points, power = self._inverse.solve(self._frame.T @ normals)
+        """Return support points and powers; see `SupportSolver`."""
+        points, power = self._solver.solve(self._frame.T @ normals)
         return self._frame @ points, power
 
-    def starts_of_one(self, normal: Floats) -> Floats:
-        """Return points (s, 3) that lead smoothly to the answer for one vector (3,), if any do."""
-        return np.asarray(self._inverse.starts_of_one(self._frame.T @ normal) @ self._frame.T)
+    def solve_scalar(self, normal: Vector) -> Vector | None:
+        """Return one support point in plain floats; see `SupportSolver`."""
+        (a, b, c), (d, e, f), (g, h, i) = self._rows
+        x, y, z = normal
+        found = self._solver.solve_scalar(
+            (a * x + d * y + g * z, b * x + e * y + h * z, c * x + f * y + i * z)
+        )
+        if found is None:
+            return None
+        x, y, z = found
+        return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
+
+    def expect(self, count: float) -> None:
+        """Make what pays if so many normals come; see `SupportSolver`."""
+        self._solver.expect(count)
 
 
 def round_frame(gauge: Gauge) -> Floats:

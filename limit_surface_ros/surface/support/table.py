@@ -15,7 +15,7 @@ tell the best. There a cell of the table is read only if one sheet of the surfac
 from __future__ import annotations
 
 from math import factorial
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,7 +23,8 @@ from limit_surface_ros.surface.linalg import squared_lengths
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Bools, Floats, Places
-    from limit_surface_ros.surface.support.solvers import Inverse
+    from limit_surface_ros.surface.gauges.gauge import FirstOrder
+    from limit_surface_ros.surface.support.solvers import SupportSolver
 
 # Cells of the table along each axis of the chart.
 _CELLS = 80
@@ -55,17 +56,6 @@ _SAME = 1e-9
 _SMOOTH = 1e-6
 
 
-class FirstOrder(Protocol):
-    """A gauge with its gradient; see `plane_minimum.Gauge`."""
-
-    def values_and_normals(self, points: Floats, /) -> tuple[Floats, Floats]:
-        """Return the values (m,) at points (3, m) and vectors (3, m) along the gradients.
-
-        These may have any length; what is at a kink adds nothing to them.
-        """
-        ...
-
-
 class SupportTable:
     """The support function D of a surface g(x) = 1, on a stereographic chart.
 
@@ -77,12 +67,12 @@ class SupportTable:
     The surface is its own mirror image: -n has the point -x.
     """
 
-    def __init__(self, gauge: FirstOrder, inverse: Inverse, *, convex: bool = True) -> None:
-        """Fit the polynomials to points that the inverse finds, and try them between these.
+    def __init__(self, gauge: FirstOrder, solver: SupportSolver, *, convex: bool = True) -> None:
+        """Fit the polynomials to points that the solver finds, and try them between these.
 
         Args:
             gauge: The gauge g.
-            inverse: Its inverse.
+            solver: For its support points.
             convex: Whether a point with the wanted normal is the answer for that alone.
 
         Raises:
@@ -91,7 +81,7 @@ class SupportTable:
         self._gauge = gauge
         places = _grid(np.linspace(-1.0, 1.0, 2 * _CELLS + 1))
         normals = _normals(places)
-        points, height = inverse.solve(normals)
+        points, height = solver.solve(normals)
         slopes = points[:2] - points[2] * places
         samples = np.array([height, *slopes / _CELLS]).reshape(3, 2 * _CELLS + 1, -1)
         coefficients, misfit = _quintics(samples)
@@ -110,7 +100,7 @@ class SupportTable:
         if convex:
             self._useful = np.asarray(_of_cells(certain).any(axis=0))
         else:
-            best = inverse.solve(middles)[0]
+            best = solver.solve(middles)[0]
             certain &= np.abs(found - best).max(axis=0) <= _SAME * np.abs(best).max(axis=0)
             smooth = misfit <= _SMOOTH * np.abs(samples[0]).max()
             self._useful = np.asarray(_of_cells(certain).all(axis=0) & smooth)

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Many points of most power at once, from a table as soon as that pays.
+"""Many support points at once, read from a table if there is one.
 
-What the table is not certain of, as across a kink, the inverse that made it solves.
+What the table is not certain of, as across a kink, the solver that made it solves. A table is
+made when a surface is prepared or at the start of one batch that it pays for, never because of
+what was asked before: a call takes the same time whatever came before it.
 """
 
 from __future__ import annotations
@@ -10,48 +12,51 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limit_surface_ros.surface.support.solvers import SupportSolver
 from limit_surface_ros.surface.support.table import SAMPLES, SupportTable
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.support.solvers import Inverse
-    from limit_surface_ros.surface.support.table import FirstOrder
+    from limit_surface_ros.surface.gauges.gauge import FirstOrder, Vector
+
+# A table pays for a batch of so many times the vectors that are solved to make it: where a point
+# with the wanted normal is the answer for that alone, and where the table is tried as well.
+_PAYS_CONVEX, _PAYS = 1.3, 2.6
 
 
-class TabulatedInverse:
-    """The inverse of a gauge, with a table from the moment that it pays."""
+class Tabulated(SupportSolver):
+    """A solver with a table of its answers."""
 
-    def __init__(self, gauge: FirstOrder, inverse: Inverse, *, convex: bool = True) -> None:
-        """Keep the gauge and its inverse, which makes the table and solves what is hard.
+    def __init__(self, gauge: FirstOrder, solver: SupportSolver, *, convex: bool = True) -> None:
+        """Keep the gauge and its solver, which makes the table and solves what is hard.
 
         Args:
-            gauge: The gauge.
-            inverse: Its inverse.
+            gauge: Of the surface g = 1.
+            solver: For its support points.
             convex: Whether a point with the wanted normal is the answer for that alone.
         """
         self._gauge = gauge
-        self._inverse = inverse
+        self._solver = solver
         self._convex = convex
-        self._asked = 0
         self._table: SupportTable | None = None
 
     def solve(self, normals: Floats) -> tuple[Floats, Floats]:
-        """Return the points (3, m) of most power for vectors (3, m), and that power (m,).
-
-        Raises:
-            SolverError: A point could not be certified.
-        """
-        if self._table is None:
-            self._asked += normals.shape[1]
-            if self._asked <= SAMPLES:
-                return self._inverse.solve(normals)
-            self._table = SupportTable(self._gauge, self._inverse, convex=self._convex)
-        points, certain = self._table.points(normals)
+        """Return support points and powers; see `SupportSolver`."""
+        # One look: another thread may put the table there between two.
+        table = self._table
+        if table is None:
+            return self._solver.solve(normals)
+        points, certain = table.points(normals)
         hard = np.flatnonzero(~certain)
         if len(hard):
-            points[:, hard] = self._inverse.solve(normals[:, hard])[0]
+            points[:, hard] = self._solver.solve(normals[:, hard])[0]
         return points, np.einsum("im,im->m", normals, points)
 
-    def starts_of_one(self, normal: Floats) -> Floats:
-        """Return points (s, 3) that lead smoothly to the answer for one vector (3,), if any do."""
-        return self._inverse.starts_of_one(normal)
+    def solve_scalar(self, normal: Vector) -> Vector | None:
+        """Return one support point in plain floats; see `SupportSolver`."""
+        return self._solver.solve_scalar(normal)
+
+    def expect(self, count: float) -> None:
+        """Make the table if it pays for so many normals at once."""
+        if self._table is None and count >= (_PAYS_CONVEX if self._convex else _PAYS) * SAMPLES:
+            self._table = SupportTable(self._gauge, self._solver, convex=self._convex)

@@ -14,10 +14,11 @@ from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.kinds.polynomial import Polynomial
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
+from limit_surface_ros.surface.support.solvers import SupportSolver
 from limit_surface_ros.surface.support.table import SupportTable
-from limit_surface_ros.surface.support.tabulated import TabulatedInverse
+from limit_surface_ros.surface.support.tabulated import Tabulated
 
-# More than it takes for a table.
+# More than enough to meet most cells of a table.
 MANY = 30_000
 FEW = 300
 
@@ -52,6 +53,11 @@ def surface_of(kind, seed):
     return Polynomial([1, 0, 0, 1 / 3, 0, 1, 0, 0, 0, 0, 2, 0, 1, 0, 3], scaling)
 
 
+def prepared(surface):
+    surface.prepare()
+    return surface
+
+
 def inverse_map(surface):
     """The map that needs a search, from vectors (n, 3) to vectors (n, 3)."""
     if surface.kind in ("dissipation", "point_contacts"):
@@ -70,9 +76,9 @@ def test_many_vectors_are_answered_as_few_are(kind, seed):
     surface = surface_of(kind, seed)
     rng = np.random.default_rng(seed)
     vectors = rng.standard_normal((MANY, 3)) / [1.0, 1.0, 0.1]
-    # A surface that was asked for little has no table yet.
+    # A surface that was not prepared has no table.
     few = inverse_map(surface_of(kind, seed))(vectors[-FEW:])
-    many = inverse_map(surface)(vectors)[-FEW:]
+    many = inverse_map(prepared(surface))(vectors)[-FEW:]
     np.testing.assert_allclose(many, few, atol=1e-9 * np.abs(few).max())
 
 
@@ -82,7 +88,7 @@ def test_where_sheets_of_a_bent_surface_meet_the_better_one_is_answered(kind, se
     surface = surface_of(kind, seed)
     rng = np.random.default_rng(seed)
     vectors = rng.standard_normal((MANY, 3)) / [1.0, 1.0, 0.1]
-    surface.wrench_of_twist(vectors)
+    surface.prepare()
     # Twists along the way between loads that differ much are where the answer jumps.
     ends = vectors[:60].reshape(2, 30, 1, 3)
     share = np.linspace(0.0, 1.0, 400)[:, np.newaxis]
@@ -94,10 +100,9 @@ def test_where_sheets_of_a_bent_surface_meet_the_better_one_is_answered(kind, se
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_single_vectors_are_answered_after_a_batch_as_before(kind):
-    surface, fresh = surface_of(kind, 7), surface_of(kind, 7)
-    vectors = np.random.default_rng(7).standard_normal((MANY, 3)) / [1.0, 1.0, 0.1]
-    inverse_map(surface)(vectors)
-    for vector in vectors[: FEW // 3]:
+    surface, fresh = prepared(surface_of(kind, 7)), surface_of(kind, 7)
+    vectors = np.random.default_rng(7).standard_normal((FEW // 3, 3)) / [1.0, 1.0, 0.1]
+    for vector in vectors:
         one, pair = inverse_map(surface)(vector), inverse_map(surface)([vector, vector])
         expected = inverse_map(fresh)(vector)
         np.testing.assert_allclose(one, expected, atol=1e-9 * np.abs(expected).max())
@@ -106,8 +111,7 @@ def test_single_vectors_are_answered_after_a_batch_as_before(kind):
 
 def test_a_corner_of_a_dissipation_model_is_answered_alone_after_a_batch():
     points = PointContacts([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]], [0.5, 0.5, 0.5])
-    surface = points.dissipation()
-    surface.twist_of_wrench(np.random.default_rng(0).standard_normal((MANY, 3)) * [1, 1, 0.1])
+    surface = prepared(points.dissipation())
     facet = surface.wrench_of_twist([-0.04, 0.04, 1.0])
     np.testing.assert_allclose(
         surface.twist_of_wrench([facet, facet])[0], points.twist_of_wrench(facet), atol=1e-9
@@ -118,7 +122,7 @@ def test_a_corner_of_a_dissipation_model_is_answered_alone_after_a_batch():
 @given(seed=st.integers(0, 10_000))
 def test_the_twist_of_a_wrench_from_the_table_is_the_twist_asked_for(seed):
     # Of full rank: at a corner a wrench has many twists.
-    surface = PowerSum.norms(matrices(np.random.default_rng(seed), 4))
+    surface = prepared(PowerSum.norms(matrices(np.random.default_rng(seed), 4)))
     twists = sampling.random_directions(MANY, seed)
     wrenches = surface.wrench_of_twist(twists)
     np.testing.assert_allclose(surface.load_factor(wrenches), 1.0, atol=1e-12)
@@ -127,7 +131,7 @@ def test_the_twist_of_a_wrench_from_the_table_is_the_twist_asked_for(seed):
 
 
 def test_opposite_vectors_have_opposite_answers():
-    surface = surface_of("norms", 3)
+    surface = prepared(surface_of("norms", 3))
     twists = np.random.default_rng(0).standard_normal((MANY, 3))
     twists[:100, 2] = 0.0
     wrenches = surface.wrench_of_twist(twists)
@@ -136,6 +140,7 @@ def test_opposite_vectors_have_opposite_answers():
 
 def test_a_facet_gives_its_one_twist_to_all_of_its_loads():
     surface = PointContacts([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]], [0.5, 0.5, 0.5])
+    surface.prepare()
     facet = sampling.facet_loads(surface, MANY // 6, 0)
     twists = surface.twist_of_wrench(facet.wrenches)
     assert np.abs(twists - facet.twists).max() < 1e-9
@@ -148,48 +153,69 @@ def test_numbers_beyond_single_precision_are_solved_without_a_warning(size):
     twists = rng.standard_normal((MANY, 3))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        wrenches = PowerSum.norms(usual * size).wrench_of_twist(twists)
-    expected = PowerSum.norms(usual).wrench_of_twist(twists)
+        wrenches = prepared(PowerSum.norms(usual * size)).wrench_of_twist(twists)
+    expected = prepared(PowerSum.norms(usual)).wrench_of_twist(twists)
     np.testing.assert_allclose(wrenches * np.sqrt(size), expected, rtol=1e-8, atol=1e-9)
 
 
-class Counted:
-    """An inverse that counts the vectors it is asked for."""
+class Counted(SupportSolver):
+    """A solver that counts the vectors it is asked for."""
 
-    def __init__(self, inverse):
-        self.inverse = inverse
+    def __init__(self, solver):
+        self.solver = solver
         self.asked = 0
 
     def solve(self, normals):
         self.asked += normals.shape[1]
-        return self.inverse.solve(normals)
-
-    def starts_of_one(self, normal):
-        return self.inverse.starts_of_one(normal)
+        return self.solver.solve(normals)
 
 
-def test_a_table_is_made_when_it_pays_and_spares_the_search():
-    tabulated = surface_of("powers", 1)._inverse._inverse
-    assert isinstance(tabulated, TabulatedInverse)
-    counted = Counted(tabulated._inverse)
-    inverse = TabulatedInverse(tabulated._gauge, counted)
+def counted_solver():
+    """A solver, and the same with a table that can be made from it."""
+    tabulated = surface_of("norms", 1).shape.solver
+    assert isinstance(tabulated, Tabulated)
+    counted = Counted(tabulated._solver)
+    return counted, Tabulated(tabulated._gauge, counted)
+
+
+def test_no_table_is_made_because_of_what_was_asked_before():
+    counted, tabulated = counted_solver()
     vectors = np.random.default_rng(0).standard_normal((3, 1000))
-    inverse.solve(vectors)
-    assert counted.asked == 1000
-    for _ in range(30):
-        inverse.solve(vectors)
+    tabulated.expect(1000)
+    for _ in range(60):
+        tabulated.solve(vectors)
+    assert counted.asked == 60 * 1000
+
+
+@pytest.mark.parametrize("count", [50_000, np.inf])
+def test_a_table_that_is_expected_to_pay_spares_the_search(count):
+    counted, tabulated = counted_solver()
+    tabulated.expect(count)
     spent = counted.asked
+    assert 20_000 < spent < 50_000
     for _ in range(10):
-        inverse.solve(vectors)
-    assert counted.asked - spent < 500
+        tabulated.solve(np.random.default_rng(0).standard_normal((3, 1000)))
+    tabulated.expect(count)
+    assert counted.asked - spent < 1000
+
+
+def test_one_large_batch_makes_the_table_that_it_is_answered_from():
+    surface = surface_of("norms", 1)
+    twists = np.random.default_rng(0).standard_normal((50_000, 3))
+    wrenches = surface.wrench_of_twist(twists)
+    assert surface.shape.solver._table is not None
+    few = surface_of("norms", 1).wrench_of_twist(twists[:FEW])
+    np.testing.assert_allclose(wrenches[:FEW], few, atol=1e-9 * np.abs(few).max())
 
 
 def test_a_point_that_the_table_cannot_prove_is_not_certain():
     surface = PointContacts([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]], [0.5, 0.5, 0.5])
-    inverse = surface._inverse_of_any
-    table = SupportTable(surface._terms, inverse)
+    tabulated = surface.shape.solver._solver
+    assert isinstance(tabulated, Tabulated)
+    solver = tabulated._solver
+    table = SupportTable(tabulated._gauge, solver)
     loads = np.random.default_rng(0).standard_normal((3, 5000))
     points, certain = table.points(loads)
-    exact = inverse.solve(loads)[0]
+    exact = solver.solve(loads)[0]
     assert 0.01 < certain.mean() < 0.9
     np.testing.assert_allclose(points[:, certain], exact[:, certain], rtol=1e-7, atol=1e-9)

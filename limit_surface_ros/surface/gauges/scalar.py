@@ -1,0 +1,329 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The gauges once more, for a single vector in plain floats: on three numbers numpy's calls cost.
+
+The same arithmetic as in `norm_sum`, `power_sum` and `quartic`, to the same rounding. A vector
+that needs care, as one in the null space of a term, is left to these: the answer is then None.
+"""
+
+from __future__ import annotations
+
+from math import exp, log, sqrt
+from operator import mul
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from limit_surface_ros.surface.linalg import NULL_TOLERANCE
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import TypeAlias
+
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.gauges.gauge import PlaneStep, Vector
+
+    # The square of a norm below which a unit vector is in its null space, and R row by row.
+    Norm: TypeAlias = tuple[float, ...]
+    # q0, b1, b2, a11, a12 and a22: in a plane |R f|^2 is q0 + 2 b.x + x'a x.
+    PlaneForm: TypeAlias = tuple[float, float, float, float, float, float]
+
+# Newton's method needs three to seven steps for a scale.
+_STEPS = 60
+# A form below this would make its term's curvature lose its digits: a corner is near.
+_SMALL = 1e-9
+
+
+class NormSumScalar:
+    """The sum of norms |R_k f|."""
+
+    def __init__(self, roots: Floats) -> None:
+        """Keep the R_k, shape (k, 3, 3)."""
+        self._norms = _norms(roots)
+
+    def value(self, point: Vector) -> float:
+        """Return the sum; the norm of a point in its null space is exactly zero."""
+        x, y, z = point
+        total = 0.0
+        size = x * x + y * y + z * z
+        for least, a, b, c, d, e, f, g, h, i in self._norms:
+            u = a * x + b * y + c * z
+            v = d * x + e * y + f * z
+            w = g * x + h * y + i * z
+            q = u * u + v * v + w * w
+            if q > least * size:
+                total += sqrt(q)
+        return total
+
+    def value_and_normal(self, point: Vector) -> tuple[float, Vector] | None:
+        """Return the sum and its gradient."""
+        x, y, z = point
+        gx = gy = gz = 0.0
+        size = x * x + y * y + z * z
+        for least, a, b, c, d, e, f, g, h, i in self._norms:
+            u = a * x + b * y + c * z
+            v = d * x + e * y + f * z
+            w = g * x + h * y + i * z
+            q = u * u + v * v + w * w
+            if not least * size < q:
+                return None
+            s = 1.0 / sqrt(q)
+            gx += s * (a * u + d * v + g * w)
+            gy += s * (b * u + e * v + h * w)
+            gz += s * (c * u + f * v + i * w)
+        return gx * x + gy * y + gz * z, (gx, gy, gz)
+
+    def in_plane(
+        self, normal: Vector, first: Vector, second: Vector
+    ) -> Callable[[float, float], PlaneStep | None]:
+        """Return the sum's logarithm in a plane; see `ScalarGauge`."""
+        forms = [_in_plane(norm, normal, first, second) for norm in self._norms]
+
+        def step(p: float, q: float) -> PlaneStep | None:
+            gauge = g1 = g2 = h11 = h12 = h22 = 0.0
+            for q0, b1, b2, a11, a12, a22 in forms:
+                c1, c2 = b1 + a11 * p + a12 * q, b2 + a12 * p + a22 * q
+                value = q0 + p * (b1 + c1) + q * (b2 + c2)
+                if not value > _SMALL * (q0 + a11 * p * p + a22 * q * q):
+                    return None
+                norm = sqrt(value)
+                gauge += norm
+                weight = 1.0 / norm
+                c1 *= weight
+                c2 *= weight
+                g1 += c1
+                g2 += c2
+                h11 += weight * (a11 - c1 * c1)
+                h12 += weight * (a12 - c1 * c2)
+                h22 += weight * (a22 - c2 * c2)
+            move = _newton_move(g1, g2, h11, h12, h22)
+            return None if move is None else (log(gauge), (g1 / gauge, g2 / gauge), move)
+
+        return step
+
+
+class PowerSumScalar:
+    """The load factor of sum_i |R_i f|^(2 p_i) = 1."""
+
+    def __init__(self, roots: Floats, exponents: Floats) -> None:
+        """Keep R_i, shape (k, 3, 3), and p_i, shape (k,)."""
+        self._norms = _norms(roots)
+        self._exponents: list[float] = exponents.tolist()
+
+    def value(self, point: Vector) -> float | None:
+        """Return the load factor."""
+        forms = self._forms(point)
+        t = None if forms is None else self._log_scale(forms)
+        return None if t is None else exp(-t)
+
+    def value_and_normal(self, point: Vector) -> tuple[float, Vector] | None:
+        """Return the load factor, and a vector along its gradient."""
+        forms = self._forms(point)
+        t = None if forms is None else self._log_scale(forms)
+        if forms is None or t is None:
+            return None
+        x, y, z = point
+        gx = gy = gz = 0.0
+        for (_, a, b, c, d, e, f, g, h, i), form, p in zip(
+            self._norms, forms, self._exponents, strict=True
+        ):
+            s = p * exp(p * (log(form) + 2.0 * t)) / form
+            u = s * (a * x + b * y + c * z)
+            v = s * (d * x + e * y + f * z)
+            w = s * (g * x + h * y + i * z)
+            gx += a * u + d * v + g * w
+            gy += b * u + e * v + h * w
+            gz += c * u + f * v + i * w
+        return exp(-t), (gx, gy, gz)
+
+    def in_plane(
+        self, normal: Vector, first: Vector, second: Vector
+    ) -> Callable[[float, float], PlaneStep | None]:
+        """Return the load factor's logarithm in a plane; see `ScalarGauge`.
+
+        By the same implicit differentiation as in `PowerSumGauge.derivatives`.
+        """
+        forms = [_in_plane(norm, normal, first, second) for norm in self._norms]
+
+        def step(p: float, q: float) -> PlaneStep | None:
+            values = []
+            for q0, b1, b2, a11, a12, a22 in forms:
+                value = q0 + p * (2.0 * b1 + a11 * p + 2.0 * a12 * q) + q * (2.0 * b2 + a22 * q)
+                if not value > _SMALL * (q0 + a11 * p * p + a22 * q * q):
+                    return None
+                values.append(value)
+            t = self._log_scale(values)
+            if t is None:
+                return None
+            total = second_total = g1 = g2 = m1 = m2 = k11 = k12 = k22 = 0.0
+            for exponent, value, (_, b1, b2, a11, a12, a22) in zip(
+                self._exponents, values, forms, strict=True
+            ):
+                share = 2.0 * exponent * exp(exponent * (log(value) + 2.0 * t))
+                weight = share / value
+                c1, c2 = b1 + a11 * p + a12 * q, b2 + a12 * p + a22 * q
+                curvature = (2.0 * exponent - 2.0) / value
+                total += share
+                second_total += 2.0 * exponent * share
+                g1 += weight * c1
+                g2 += weight * c2
+                m1 += 2.0 * exponent * weight * c1
+                m2 += 2.0 * exponent * weight * c2
+                k11 += weight * (a11 + curvature * c1 * c1)
+                k12 += weight * (a12 + curvature * c1 * c2)
+                k22 += weight * (a22 + curvature * c2 * c2)
+            g1 /= total
+            g2 /= total
+            both = second_total / total + 1.0
+            h11 = (k11 - 2.0 * m1 * g1) / total + both * g1 * g1
+            h12 = (k12 - m1 * g2 - m2 * g1) / total + both * g1 * g2
+            h22 = (k22 - 2.0 * m2 * g2) / total + both * g2 * g2
+            move = _newton_move(g1, g2, h11, h12, h22)
+            return None if move is None else (-t, (g1, g2), move)
+
+        return step
+
+    def _forms(self, point: Vector) -> list[float] | None:
+        """Return |R_i f|^2, None if f is in the null space of one."""
+        x, y, z = point
+        size = x * x + y * y + z * z
+        forms = []
+        for least, a, b, c, d, e, f, g, h, i in self._norms:
+            u = a * x + b * y + c * z
+            v = d * x + e * y + f * z
+            w = g * x + h * y + i * z
+            q = u * u + v * v + w * w
+            if not least * size < q:
+                return None
+            forms.append(q)
+        return forms
+
+    def _log_scale(self, forms: list[float]) -> float | None:
+        """Return t with sum_i exp(p_i (log q_i + 2 t)) = 1; see `power_scale.LogarithmicScale`."""
+        t = -log(sum(map(sqrt, forms)))
+        slopes = [(2.0 * p, p * log(q)) for p, q in zip(self._exponents, forms, strict=True)]
+        for _ in range(_STEPS):
+            value = rise = 0.0
+            for slope, offset in slopes:
+                part = exp(slope * t + offset)
+                value += part
+                rise += slope * part
+            step = log(value) * value / rise
+            t -= step
+            if -1e-9 < step < 1e-9:
+                return t
+        return None
+
+
+class QuarticScalar:
+    """The load factor P(f)^(1/4) of a polynomial of fourth order; see `quartic.Quartic`."""
+
+    def __init__(self, first: Floats, second: Floats) -> None:
+        """Keep the derivatives of P as `Quartic` has them, shapes (3, 10) and (3, 3, 6)."""
+        self._gradient_rows: list[list[float]] = first.tolist()
+        self._hessian_rows: list[list[float]] = [
+            second[row, column].tolist() for row in range(3) for column in range(row, 3)
+        ]
+
+    def value(self, point: Vector) -> float:
+        """Return the load factor."""
+        return self.value_and_normal(point)[0]
+
+    def value_and_normal(self, point: Vector) -> tuple[float, Vector]:
+        """Return the load factor, and the gradient of P at the point over its size."""
+        size = abs(point[0]) + abs(point[1]) + abs(point[2])
+        x, y, m = point[0] / size, point[1] / size, point[2] / size
+        xx, yy, mm = x * x, y * y, m * m
+        cubics = (
+            xx * x,
+            xx * y,
+            xx * m,
+            x * yy,
+            x * y * m,
+            x * mm,
+            yy * y,
+            yy * m,
+            y * mm,
+            mm * m,
+        )
+        gx, gy, gm = (sum(map(mul, row, cubics)) for row in self._gradient_rows)
+        return size * sqrt(sqrt(0.25 * (gx * x + gy * y + gm * m))), (gx, gy, gm)
+
+    def in_plane(
+        self, normal: Vector, first: Vector, second: Vector
+    ) -> Callable[[float, float], PlaneStep | None]:
+        """Return the load factor's logarithm in a plane; see `ScalarGauge`."""
+        nx, ny, nm = normal
+        ax, ay, am = first
+        bx, by, bm = second
+        rows = self._hessian_rows
+
+        def step(p: float, q: float) -> PlaneStep | None:
+            x, y, m = nx + p * ax + q * bx, ny + p * ay + q * by, nm + p * am + q * bm
+            squares = (x * x, x * y, x * m, y * y, y * m, m * m)
+            xx, xy, xm, yy, ym, mm = (sum(map(mul, row, squares)) for row in rows)
+            # The Hessian times the load, and the plane's axes: by Euler's theorem the first is
+            # three times the gradient, and that times the load four times the value.
+            a1, a2, a3 = (
+                xx * ax + xy * ay + xm * am,
+                xy * ax + yy * ay + ym * am,
+                xm * ax + ym * ay + mm * am,
+            )
+            b1, b2, b3 = (
+                xx * bx + xy * by + xm * bm,
+                xy * bx + yy * by + ym * bm,
+                xm * bx + ym * by + mm * bm,
+            )
+            g1, g2 = (a1 * x + a2 * y + a3 * m) / 3.0, (b1 * x + b2 * y + b3 * m) / 3.0
+            value = (
+                x * (xx * x + 2.0 * (xy * y + xm * m)) + y * (yy * y + 2.0 * ym * m) + mm * m * m
+            ) / 12.0
+            if not value > 0.0:
+                return None
+            # The Hessian of the fourth root is, but for a factor, that of P less 3/4 g g' / P.
+            correction = 0.75 / value
+            move = _newton_move(
+                g1,
+                g2,
+                a1 * ax + a2 * ay + a3 * am - correction * g1 * g1,
+                a1 * bx + a2 * by + a3 * bm - correction * g1 * g2,
+                b1 * bx + b2 * by + b3 * bm - correction * g2 * g2,
+            )
+            scale = 0.25 / value
+            return None if move is None else (0.25 * log(value), (scale * g1, scale * g2), move)
+
+        return step
+
+
+def _norms(roots: Floats) -> list[Norm]:
+    rows = roots.reshape(-1, 9)
+    least = NULL_TOLERANCE * np.square(rows).sum(axis=1)
+    return [(small, *row) for small, row in zip(least.tolist(), rows.tolist(), strict=True)]
+
+
+def _in_plane(norm: Norm, normal: Vector, first: Vector, second: Vector) -> PlaneForm:
+    """Return the square of a norm in the plane n + p e1 + q e2."""
+    _, a, b, c, d, e, f, g, h, i = norm
+    x, y, z = normal
+    n0, n1, n2 = a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
+    x, y, z = first
+    p0, p1, p2 = a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
+    x, y, z = second
+    q0, q1, q2 = a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
+    return (
+        n0 * n0 + n1 * n1 + n2 * n2,
+        n0 * p0 + n1 * p1 + n2 * p2,
+        n0 * q0 + n1 * q1 + n2 * q2,
+        p0 * p0 + p1 * p1 + p2 * p2,
+        p0 * q0 + p1 * q1 + p2 * q2,
+        q0 * q0 + q1 * q1 + q2 * q2,
+    )
+
+
+def _newton_move(
+    g1: float, g2: float, h11: float, h12: float, h22: float
+) -> tuple[float, float] | None:
+    """Return the move to the minimum for a gradient and a Hessian, None if that is near flat."""
+    determinant = h11 * h22 - h12 * h12
+    if not (determinant > 1e-10 * (h11 + h22) ** 2 and h11 > 0.0):
+        return None
+    return (h12 * g2 - h22 * g1) / determinant, (h12 * g1 - h11 * g2) / determinant
