@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pushes of every kind of surface are right at every friction and in every direction."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,11 +11,13 @@ from scipy.optimize import least_squares
 
 from limit_surface_ros.errors import NotFiniteError, RangeError, ShapeError, ZeroVectorError
 from limit_surface_ros.motion.push import MODES, ContactMode, push, pushes
+from limit_surface_ros.surface.base import LimitSurface
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.kinds.polynomial import MONOMIALS, Polynomial
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
+from limit_surface_ros.surface.shape import Shape
 
 SCALING = Scaling(0.05, 2.0)
 FRICTIONS = (0.0, 0.3, 1.0, 1.5, 3.0, 10.0, 1e4, 1e8, 1e15, np.inf)
@@ -253,25 +257,31 @@ def test_pushes_agree_with_an_independent_complementarity_solve(kind):
     assert met >= 5
 
 
-class Box:
+class BoxShape(Shape):
+    """Loads of which no component is above 1."""
+
+    def load_factors(self, loads):
+        return np.abs(loads).max(axis=0)
+
+    def motions(self, loads):
+        largest = np.abs(loads).argmax(axis=0), np.arange(loads.shape[1])
+        motions = np.zeros_like(loads)
+        motions[largest] = np.sign(loads[largest])
+        return motions
+
+    def loads(self, motions):
+        return np.sign(motions)
+
+
+@dataclass(frozen=True, eq=False)
+class Box(LimitSurface):
     """A kind that the package does not know: loads of which no component is above its limit."""
 
     kind = "box"
-    scaling = SCALING
+    scaling: Scaling = SCALING
 
-    def load_factor(self, wrench):
-        return np.abs(np.asarray(wrench) / SCALING.wrench_unit).max(axis=-1)
-
-    def twist_of_wrench(self, wrench):
-        loads = np.asarray(wrench) / SCALING.wrench_unit
-        largest = np.abs(loads) == np.abs(loads).max(axis=-1, keepdims=True)
-        return np.where(largest, np.sign(loads), 0.0) * SCALING.twist_unit
-
-    def twist_and_load_factor(self, wrench):
-        return self.twist_of_wrench(wrench), self.load_factor(wrench)
-
-    def wrench_of_twist(self, twist):
-        return np.sign(twist) * SCALING.wrench_unit
+    def _new_shape(self):
+        return BoxShape()
 
 
 @pytest.mark.parametrize("friction", [0.4, np.inf])
