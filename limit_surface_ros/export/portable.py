@@ -223,7 +223,7 @@ def _corners(roots: Floats) -> tuple[Corner, ...]:
                     each.points[0],
                     each.inverses[0],
                     each.centres[0],
-                    each.bends[0],
+                    each.curvatures[0],
                     rest * scale,
                 )
             )
