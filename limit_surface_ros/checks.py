@@ -33,17 +33,6 @@ def counted(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
-def shortened(text: str, most: int = 200) -> str:
-    """Return a text for a message: whole, or its first and last characters and its length.
-
-    What others chose, such as a name, may be a megabyte long, and stays in a log for ever.
-    """
-    if len(text) <= most:
-        return text
-    kept = max(1, most // 2 - 20)
-    return f"{text[:kept]} ... {text[-kept:]} ({len(text)} characters)"
-
-
 def as_floats(name: str, values: ArrayLike) -> Floats:
     """Return `values` as a finite float64 array of any shape.
 

@@ -13,12 +13,29 @@ from typing import ClassVar
 
 # Files of requirements/ that bring an extra into a clone, where that is not extras.txt.
 _GROUPS = {"peers": "bench"}
+# Characters of a message at most.
+_LONGEST = 2000
+
+
+def shortened(text: str, most: int = 200) -> str:
+    """Return a text for a message: whole, or its first and last characters and its length.
+
+    What others chose, such as a name, may be a megabyte long, and stays in a log for ever.
+    """
+    if len(text) <= most:
+        return text
+    kept = max(1, most // 2 - 20)
+    return f"{text[:kept]} ... {text[-kept:]} ({len(text)} characters)"
 
 
 class LimitSurfaceError(Exception):
     """Base of every error that this package raises on purpose."""
 
     code: ClassVar[str] = "INTERNAL"
+
+    def __str__(self) -> str:
+        """Return the message, of which a file or a caller may have chosen a part, in bounds."""
+        return shortened(super().__str__(), _LONGEST)
 
 
 class ShapeError(LimitSurfaceError, ValueError):

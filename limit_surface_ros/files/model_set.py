@@ -11,8 +11,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
-from limit_surface_ros.checks import shortened
-from limit_surface_ros.errors import FileError, UnknownModelError
+from limit_surface_ros.errors import FileError, UnknownModelError, shortened
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limit_surface_ros.checks import LARGEST, shortened
-from limit_surface_ros.errors import FileError, LimitSurfaceError
+from limit_surface_ros.checks import LARGEST
+from limit_surface_ros.errors import FileError, LimitSurfaceError, shortened
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import yaml
 
-from limit_surface_ros.checks import shortened
-from limit_surface_ros.errors import FileError
+from limit_surface_ros.errors import FileError, shortened
 from limit_surface_ros.files.atomic_write import write_atomically
 from limit_surface_ros.files.regular_file import read_text
 from limit_surface_ros.files.section import Section
