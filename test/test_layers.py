@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ast
+import graphlib
 import subprocess
 import sys
 from pathlib import Path
@@ -88,6 +89,38 @@ def test_nodes_never_import_what_fits():
     for path in MODULES:
         if layer_of(path.relative_to(ROOT).parts) == "nodes":
             assert not [name for name in imported(path) if own_layer(name) == "fitting"]
+
+
+def test_only_one_program_rebuilds_the_thesis():
+    for path in MODULES:
+        parts = path.relative_to(ROOT).parts
+        if parts[0] != "thesis" and parts != ("tools", "reproduce_thesis.py"):
+            assert not [name for name in imported(path) if own_layer(name) == "thesis"], path
+
+
+def test_no_imports_go_in_a_circle():
+    names = {dotted(path) for path in MODULES}
+    graph = {
+        dotted(path): {
+            module
+            for name in imported(path)
+            for module in (name, name.rpartition(".")[0])
+            # Whoever imports a module of a package imports the package, and not the other way.
+            if module in names and not dotted(path).startswith(f"{module}.")
+        }
+        - {dotted(path)}
+        for path in MODULES
+    }
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as error:
+        pytest.fail(f"a circle of imports: {' -> '.join(error.args[1])}")
+
+
+def test_no_folder_of_surfaces_is_a_maze():
+    for folder in (ROOT / "surface", *(ROOT / "surface").rglob("*/")):
+        modules = [path for path in folder.glob("*.py") if path.name != "__init__.py"]
+        assert len(modules) <= 10, f"{folder.name} has {len(modules)} modules"
 
 
 def run(code: str) -> None:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from limit_surface_ros.thesis.findings import Claim
-    from limit_surface_ros.thesis.store import Record
+    from limit_surface_ros.thesis.records import Record
 
 VERDICTS = {True: "holds", False: "does not hold", None: "open"}
 _MARKS = {True: "✓", False: "✗", None: "?"}

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from limit_surface_ros import __version__
 from limit_surface_ros.files.atomic_write import write_atomically
 from limit_surface_ros.thesis.page import page_of
+from limit_surface_ros.thesis.records import find_record, keep_record
 from limit_surface_ros.thesis.settings import FULL
 
 if TYPE_CHECKING:
@@ -16,7 +17,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from limit_surface_ros.thesis.findings import Study
-    from limit_surface_ros.thesis.store import Record, Store
+    from limit_surface_ros.thesis.records import Record
+    from limit_surface_ros.thesis.store import Store
 
 PAGE = "index.html"
 
@@ -38,7 +40,7 @@ def carry_out(
     Returns:
         The page.
     """
-    found = [store.find(study) for study in studies]
+    found = [find_record(store, study) for study in studies]
     missing = [study for study, record in zip(studies, found, strict=True) if record is None]
     fits = {name for study in missing for name in study.needs}
     total = len(fits) + len(studies)
@@ -54,7 +56,7 @@ def carry_out(
     progress(done, total)
     for study, record in zip(studies, found, strict=True):
         if record is None:
-            record = counting.keep(study, study.carry_out(store.settings, counting))
+            record = keep_record(counting, study, study.carry_out(store.settings, counting))
             done += 1
             tell(f"{study.number:<5} {study.title}")
         else:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The promise of `plots.thesis.store` and `run`: nothing is worked out twice, nothing is half."""
+"""The promise of `thesis.store` and its records: nothing is worked out twice, nothing is half."""
 
 import csv
 import re
@@ -12,9 +12,10 @@ from limit_surface_ros.files.surface_file import SurfaceModel
 from limit_surface_ros.plots.canvas import new_figure
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.thesis.findings import Claim, Findings, Study
+from limit_surface_ros.thesis.records import csv_text
 from limit_surface_ros.thesis.run import carry_out
 from limit_surface_ros.thesis.settings import QUICK
-from limit_surface_ros.thesis.store import Store, csv_text
+from limit_surface_ros.thesis.store import Store
 
 pytest.importorskip("matplotlib", reason="matplotlib draws the pictures")
 
