@@ -27,6 +27,12 @@ using Vector = std::array<T, 3>;
 template <class T>
 using Matrix = std::array<std::array<T, 3>, 3>;
 
+// Where a map writes its Jacobian; a null pointer asks for none.
+template <class T>
+struct JacobianOf {
+    using Pointer = Matrix<T>*;
+};
+
 // What a map says beside its answer; an answer is written only if it is ok.
 enum class Status { ok, zero_vector, not_finite, no_convergence };
 
@@ -665,7 +671,7 @@ Status load_factor(const Vector<T>& wrench, T& factor) noexcept {
 // the wrench [m/s/N, ...] if `jacobian` is not null.
 template <class T>
 Status twist_of_wrench(const Vector<T>& wrench, Vector<T>& twist,
-                       Matrix<T>* jacobian = nullptr) noexcept {
+                       typename JacobianOf<T>::Pointer jacobian = nullptr) noexcept {
     using std::sqrt;
     Vector<T> x{};
     double size = 0.0;
@@ -702,7 +708,7 @@ Status twist_of_wrench(const Vector<T>& wrench, Vector<T>& twist,
 @INVERSE_COMMENT@
 template <class T>
 Status wrench_of_twist(const Vector<T>& twist, Vector<T>& wrench,
-                       Matrix<T>* jacobian = nullptr) noexcept {
+                       typename JacobianOf<T>::Pointer jacobian = nullptr) noexcept {
     // Of the scalar, so that it is looked at only where somebody calls this map.
     static_assert(!model::gauge_of_loads || model::convex || sizeof(T) == 0,
                   "this surface is not certified convex: its wrench of a twist is not exported");
