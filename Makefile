@@ -29,7 +29,7 @@ test_nightly: ## Run the tests that take long, which `make test` leaves out (ARG
 
 test_exports: ## Run the tests of exported models where CasADi, JAX and MuJoCo are (some 500 MB)
 	@scripts/with_ros --with test --with extras --with exports -- python3 scripts/run_pytest.py \
-	    test/export $(ARGS)
+	    test/export test/examples/test_example_controllers.py $(ARGS)
 
 lint: ## Check style, types and package descriptions
 	@scripts/with_ros --tools lint -- scripts/lint
