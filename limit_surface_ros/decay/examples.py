@@ -64,22 +64,23 @@ def kink_with_tail() -> Analytic:
     return Analytic(
         lambda t: np.maximum(0.8 * (1.0 - t), 0.0) + 0.2 * np.exp(-0.5 * np.maximum(t - 1.0, 0.0)),
         np.array([1.0]),
+        "monotone",
     )
 
 
 def exponential() -> Analytic:
     """Return exp(-t)."""
-    return Analytic(lambda t: np.exp(-t))
+    return Analytic(lambda t: np.exp(-t), shape="convex")
 
 
 def gaussian() -> Analytic:
     """Return exp(-t^2)."""
-    return Analytic(lambda t: np.exp(-(t**2)))
+    return Analytic(lambda t: np.exp(-(t**2)), shape="monotone")
 
 
 def power_law() -> Analytic:
     """Return 1 / (1 + t)^2."""
-    return Analytic(lambda t: 1.0 / (1.0 + t) ** 2)
+    return Analytic(lambda t: 1.0 / (1.0 + t) ** 2, shape="convex")
 
 
 EXAMPLES: dict[str, Callable[[], Target]] = {

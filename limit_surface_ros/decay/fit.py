@@ -10,24 +10,27 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from limit_surface_ros.checks import as_positive
 from limit_surface_ros.decay.basis import as_rates
+from limit_surface_ros.decay.certify import LargestError, certified_error
 from limit_surface_ros.decay.coefficients import ResponseFit, fit_response
 from limit_surface_ros.decay.delay.rates import dde_rates
 from limit_surface_ros.decay.esprit import continued_rates, esprit_choices, esprit_rates
+from limit_surface_ros.decay.grids import is_steep
 from limit_surface_ros.decay.least_squares import least_squares_fit, require_samples
 from limit_surface_ros.decay.neutral import neutral_rates
-from limit_surface_ros.decay.noise import is_noisy, noise_level
+from limit_surface_ros.decay.noise import LEAST_SAMPLES, is_noisy, noise_level
 from limit_surface_ros.decay.outliers import running_median
 from limit_surface_ros.decay.polish import polished_rates
 from limit_surface_ros.decay.rates import RateChoice
+from limit_surface_ros.decay.steep import steep_rates
 from limit_surface_ros.decay.tail import Tail, envelope_of, tail_of
-from limit_surface_ros.decay.targets import PiecewiseLinear
+from limit_surface_ros.decay.targets import PiecewiseLinear, Record
 from limit_surface_ros.errors import DataError, LimitSurfaceError, RangeError, SolverError
 
 if TYPE_CHECKING:
@@ -57,6 +60,8 @@ class DecayFit:
         choice: The rates, their method and what the method chose.
         fit: The coefficients and their errors.
         seconds: Time it took [s].
+        largest: The largest error on the interval, found and proven; None for a record, whose
+            samples are all that is known of it.
         tail: What is assumed after the interval, and what the sum does there; None if it was left
             free or does not decay.
         noise: Standard deviation of the record's noise, in the unit of x; 0 if it has none.
@@ -67,6 +72,7 @@ class DecayFit:
     choice: RateChoice
     fit: ResponseFit
     seconds: float
+    largest: LargestError | None = None
     tail: Tail | None = None
     noise: float = 0.0
     outliers: Floats = field(default_factory=lambda: np.zeros(0))
@@ -179,6 +185,7 @@ def fit_decay(
             found.choice,
             found.fit,
             time.perf_counter() - start,
+            None,
             tail_of(found.fit.sum, span, found.envelope),
             noise,
             found.outliers,
@@ -192,10 +199,14 @@ def fit_decay(
         choice, fit = _fewest(response, span, method, used, chosen, envelope, tell)
     else:
         choice, fit = _fitted(response, terms, span, method, used, chosen, envelope, tell)
+    largest = None
+    if not isinstance(response, Record):
+        largest = certified_error(fit.sum, response, span)
+        fit = replace(fit, max_error=max(fit.max_error, largest.found))
     tail = None
     if envelope is not None and fit.sum.settles:
         tail = tail_of(fit.sum, span, envelope)
-    return DecayFit(choice, fit, time.perf_counter() - start, tail, noise)
+    return DecayFit(choice, fit, time.perf_counter() - start, largest, tail, noise)
 
 
 def refuse_growth(response: Target, end: float) -> None:
@@ -204,12 +215,15 @@ def refuse_growth(response: Target, end: float) -> None:
     Raises:
         DataError: It grows.
     """
-    times = np.linspace(0.0, end, GROWTH_POINTS)
-    sizes = running_median(np.abs(response(times)))
-    last = len(times) // 10
+    if isinstance(response, PiecewiseLinear) and len(response.knots) >= LEAST_SAMPLES:
+        # Without outliers, which may be larger than all else.
+        sizes = running_median(np.abs(response.values[response.knots <= end]))
+    else:
+        sizes = np.abs(response(np.linspace(0.0, end, GROWTH_POINTS)))
+    last = max(1, len(sizes) // 10)
     onset = max(float(sizes[0]), abs(float(response(0.0))))
     highest = float(sizes[-last:].max())
-    if highest > GROWN * onset and highest > float(sizes[:-last].max()):
+    if highest > GROWN * onset and highest > float(sizes[:-last].max(initial=0.0)):
         raise DataError(
             f"the response grows: it starts at {float(response(0.0)):.4g} and is largest, "
             f"{highest:.4g}, at the end of [0, {end:g}] s. A decay model dies away: does the "
@@ -307,6 +321,8 @@ def _choose(
         choice = esprit_rates(response, terms, end)
     elif method == "polished":
         choice = _polished(response, terms, end, tell)
+    elif method == "steep":
+        choice = steep_rates(response, terms, end)
     else:
         return _best(response, terms, end, options, tell)
     tell(f"{method}: {len(choice.rates)} rates, error {choice.error:.4g}")
@@ -342,7 +358,8 @@ def _best(
     """Keep the best of the methods that need no kernel; one that fails does not spoil others."""
     choices: list[RateChoice] = []
     failure: LimitSurfaceError | None = None
-    for method in ("polished", "neutral"):
+    methods = ("polished", "neutral", *(("steep",) if is_steep(response, end) else ()))
+    for method in methods:
         try:
             choices.append(_choose(response, terms, end, method, options, tell))
         except LimitSurfaceError as error:

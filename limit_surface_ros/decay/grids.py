@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.decay.targets import Record
+from limit_surface_ros.decay.targets import PiecewiseLinear, Record
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
@@ -20,6 +20,11 @@ if TYPE_CHECKING:
     from limit_surface_ros.decay.targets import Target
 
 LEAST_POINTS, MOST_POINTS = 4_000, 40_000
+# A steep response changes by this part of its onset within half a step of the grid. Times that
+# resolve its start begin well before it has changed by a small part, and are so dense.
+MUCH, SMALL, POINTS_A_DECADE = 1e-2, 1e-4, 40
+# Where a first change is looked for, in parts of the interval, and on how many points.
+FIRST_TIME, CHANGE_POINTS = 1e-16, 641
 # Places at which the largest error is looked for between the points of the grid.
 MOST_LOOKS = 200
 # And between any two samples of a record, as parts of their distance.
@@ -35,7 +40,34 @@ def fit_times(response: Target, end: float, fastest: float) -> Floats:
         return response.knots[response.knots <= end]
     count = int(np.clip(12.0 * end * fastest / np.pi, LEAST_POINTS, MOST_POINTS))
     inside = response.breakpoints[response.breakpoints < end]
-    return np.unique(np.concatenate([np.linspace(0.0, end, count), inside]))
+    start = graded_start(response, end)
+    return np.unique(np.concatenate([np.linspace(0.0, end, count), inside, start]))
+
+
+def time_of_change(response: Target, end: float, part: float) -> float:
+    """Return the first time [s] at which |x - x(0)| reaches a part of |x(0)|; at most `end`."""
+    times = np.geomspace(FIRST_TIME * end, end, CHANGE_POINTS)
+    onset = float(response(0.0))
+    changed = np.flatnonzero(np.abs(response(times) - onset) >= part * abs(onset))
+    return float(times[changed[0]]) if len(changed) else end
+
+
+def is_steep(response: Target, end: float) -> bool:
+    """Tell whether a function changes much before the second point of a uniform grid."""
+    if isinstance(response, PiecewiseLinear):
+        return False
+    onset, soon = response(np.array([0.0, 0.5 * end / LEAST_POINTS]))
+    return bool(abs(soon - onset) >= MUCH * abs(onset))
+
+
+def graded_start(response: Target, end: float) -> Floats:
+    """Return times that resolve a steep start on every scale [s]; none if it is not steep."""
+    if not is_steep(response, end):
+        return np.zeros(0)
+    first = 0.1 * time_of_change(response, end, SMALL)
+    count = round(POINTS_A_DECADE * float(np.log10(end / first))) + 1
+    times: Floats = np.append(0.0, np.geomspace(first, end, count))
+    return times
 
 
 def largest_error(x: ExponentialSum, response: Target, start: float, end: float) -> float:

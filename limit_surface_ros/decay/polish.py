@@ -44,7 +44,7 @@ MOST_STEPS = 100
 STALL, LEAST_GAIN = 6, 1e-3
 # An error of this part of the response cannot be made smaller.
 ROUNDING = 1e-14
-# Rates are kept left of this many decays over the interval.
+# Rates are kept left of this many decays over the interval, unless the caller says otherwise.
 LEAST_DECAYS = 0.4
 # Most refits of the coefficients until no point of the fine grid is worse than those seen, by this
 # part; peaks are seen from these parts of the largest error on, in refits and in steps.
@@ -65,6 +65,7 @@ def polished_rates(
     start: RateChoice,
     progress: Callable[[int, float], None] | None = None,
     envelope: float | None = None,
+    least_decays: float = LEAST_DECAYS,
 ) -> RateChoice:
     """Return rates near those of another choice with a smaller largest error on [0, end].
 
@@ -75,11 +76,12 @@ def polished_rates(
         progress: Called after each step with its number and the error so far.
         envelope: After the end the sum is held to this, or to its error if that is larger; it is
             free there if None.
+        least_decays: Rates are kept left of this many decays over the interval.
 
     Raises:
         SolverError: Not even the start could be fitted.
     """
-    problem = _Problem(response, end, start.rates, envelope)
+    problem = _Problem(response, end, start.rates, envelope, least_decays)
     point = problem.fitted(start.rates)
     radius, stalled, steps = FIRST_RADIUS, 0, 0
     while steps < MOST_STEPS and radius > LEAST_RADIUS and stalled < STALL:
@@ -116,7 +118,12 @@ class _Problem:
     """
 
     def __init__(
-        self, response: Target, end: float, rates: Complexes, envelope: float | None
+        self,
+        response: Target,
+        end: float,
+        rates: Complexes,
+        envelope: float | None,
+        least_decays: float,
     ) -> None:
         fastest = float(np.abs(rates.imag).max())
         self.times = fit_times(response, end, fastest)
@@ -130,7 +137,7 @@ class _Problem:
             self.times = np.append(self.times, tail)
             self.target = np.append(self.target, np.zeros(len(tail)))
             self.weights = np.ones(len(self.times))
-        self.least_decay = LEAST_DECAYS / end
+        self.least_decay = least_decays / end
         self.base = np.zeros(len(self.times), dtype=bool)
         self.base[:: max(1, len(self.times) // max(300, 6 * count_terms(rates)))] = True
         self.seen = self.base

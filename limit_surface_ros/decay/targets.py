@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 # Sizes of a record's largest value between which fits neither overflow nor lose digits.
 SMALLEST, LARGEST = 1e-100, 1e100
+SHAPES = ("", "monotone", "convex")
 # Samples count as uniform whose times lie within this part of their distance.
 UNEVEN = 1e-3
 
@@ -131,18 +132,23 @@ class Analytic:
     Attributes:
         function: Takes times [s] of any shape and returns x there.
         breakpoints: Times after 0 at which the slope jumps [s].
+        shape: "monotone" or "convex" if x is so for all t >= 0, which proves what lies between
+            points that were looked at; "" if nothing is known.
 
     Raises:
         NotFiniteError: A breakpoint or x(0) is NaN or infinite.
-        RangeError: A breakpoint is not above 0.
+        RangeError: A breakpoint is not above 0, or the shape is not known.
         DataError: x(0) = 0.
     """
 
     function: Callable[[Floats], Floats]
     breakpoints: Floats = field(default_factory=lambda: np.zeros(0))
+    shape: str = ""
 
     def __post_init__(self) -> None:
-        """Check the breakpoints and the onset."""
+        """Check the breakpoints, the shape and the onset."""
+        if self.shape not in SHAPES:
+            raise RangeError(f"shape must be one of {', '.join(SHAPES[1:])} or empty")
         breakpoints = np.sort(as_floats("breakpoints", self.breakpoints))
         if (breakpoints <= 0.0).any():
             raise RangeError(f"breakpoints must be above 0, got {float(breakpoints[0])}")

@@ -57,6 +57,7 @@ class Samples:
         noise: Standard deviation of a sample of weight 1, above 0.
         envelope: What |x|, less its constant, never exceeds after the last time; above 0.
         offset: Whether a constant is fitted beside the exponentials.
+        least_decays: Rates are kept left of this many decays over the record.
         misfit: By how much the residuals exceed the noise, at least 1: what comes after the last
             time is weighed against them.
     """
@@ -68,6 +69,7 @@ class Samples:
     envelope: float
     offset: bool = False
     misfit: float = 1.0
+    least_decays: float = LEAST_DECAYS
 
     @property
     def end(self) -> float:
@@ -112,7 +114,7 @@ class VariableProjection:
         self._tail_weight = self._allowed / samples.envelope
         self._ridge = 1.0 / (LARGE_COEFFICIENT * float(np.abs(samples.values).max()))
         steps = np.diff(samples.times)
-        self._decays = LEAST_DECAYS / samples.end, MOST_DECAYS / float(steps.min())
+        self._decays = samples.least_decays / samples.end, MOST_DECAYS / float(steps.min())
         self._highest = np.pi / float(np.median(steps))
 
     def within_bounds(self, rates: Complexes) -> Complexes:

@@ -37,6 +37,7 @@ from limit_surface_ros.tools.training_data import is_bag
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from limit_surface_ros.decay.certify import LargestError
     from limit_surface_ros.decay.fit import DecayFit
     from limit_surface_ros.tools.csv_options import OF_RESPONSES
 from limit_surface_ros.tools.decay_input import DecayInput
@@ -73,6 +74,8 @@ examples:
 MOST_LEFT, LARGE_ERROR = 0.9, 0.5
 # `--offset free`: the constant is fitted beside the terms.
 FREE = "free"
+# A proven error is stated if it is at most so many times the one found.
+PROVEN = 1.02
 # Outliers whose times are printed, and written.
 MOST_SHOWN, MOST_WRITTEN = 8, 1000
 
@@ -219,12 +222,13 @@ def report(result: DecayFit, given: DecayInput) -> None:
     after = beyond(result, given)
     slowest = fit.sum.rates[int(np.argmax(fit.sum.rates.real))]
     where = "" if given.samples is None else f"at the {given.samples} samples "
+    proof = "" if result.largest is None else f"; {proof_in_words(result.largest)}"
     rows = [
         ("response", given.source + (f" less {given.offset:.6g}" if given.offset else "")),
         *(("read", note) for note in given.notes),
         ("method", choice.method + (f" ({chosen})" if chosen else "")),
         ("terms", f"{fit.sum.terms} real ({len(fit.sum.rates)} rates)"),
-        ("error", f"{fit.max_error:.4e} {where}on [0, {given.end:g}] s"),
+        ("error", f"{fit.max_error:.4e} {where}on [0, {given.end:g}] s{proof}"),
     ]
     lines = between(result, given)
     if lines is not None:
@@ -263,6 +267,13 @@ def report(result: DecayFit, given: DecayInput) -> None:
         print(f"{label:<11} {value}")
 
 
+def proof_in_words(largest: LargestError) -> str:
+    """Return how far the largest error that was found is also proven."""
+    if np.isfinite(largest.proven):
+        return f"proven to be at most {largest.proven:.4e}"
+    return f"found on {largest.points} points and refined near the highest, not proven"
+
+
 def outliers_in_words(result: DecayFit) -> str:
     """Return how many samples were taken as outliers, and when the first of them were."""
     shown = ", ".join(f"{time:.6g}" for time in result.outliers[:MOST_SHOWN])
@@ -295,6 +306,10 @@ def provenance(result: DecayFit, given: DecayInput) -> dict[str, Any]:
         values["start"] = given.start
     if given.offset:
         values["offset"] = given.offset
+    if result.largest is not None and np.isfinite(result.largest.proven):
+        values["error_proven"] = result.largest.proven
+    elif result.largest is not None:
+        values["error_found_on"] = result.largest.points
     if len(result.outliers):
         values["outlier_times"] = result.outliers[:MOST_WRITTEN].tolist()
     if result.terms_tried:
@@ -305,6 +320,14 @@ def provenance(result: DecayFit, given: DecayInput) -> dict[str, Any]:
         values["error_beyond"] = after
         values["beyond_until"] = given.horizon
     return values
+
+
+def stated_error(result: DecayFit) -> float:
+    """Return the error for the model file: the proven one where it is close to the one found."""
+    found, largest = result.fit.max_error, result.largest
+    if largest is not None and largest.proven <= PROVEN * found:
+        return max(found, largest.proven)
+    return found
 
 
 def model_of(result: DecayFit, given: DecayInput, name: str) -> DecayModel:
@@ -318,7 +341,7 @@ def model_of(result: DecayFit, given: DecayInput, name: str) -> DecayModel:
         sum=result.fit.sum,
         time_span=(0.0, given.end),
         norm=result.fit.norm,
-        max_error=result.fit.max_error,
+        max_error=stated_error(result),
         system=result.choice.system,
         tail=result.tail,
         noise=result.noise,
