@@ -17,6 +17,7 @@ from scipy import optimize
 from limit_surface_ros.checks import as_positive
 from limit_surface_ros.decay.basis import as_rates, count_terms
 from limit_surface_ros.decay.coefficients import fit_response
+from limit_surface_ros.decay.delay.system import DelaySystem
 from limit_surface_ros.decay.noise import settling_time, smoothed
 from limit_surface_ros.decay.rates import RateChoice, judged, predicted_error
 from limit_surface_ros.decay.targets import largest_slope_jump
@@ -54,6 +55,26 @@ def neutral_roots(terms: int, damping: float, length: float) -> Complexes:
     frequencies = 2.0 * np.pi * (np.arange((terms + 1) // 2) + shift) / period
     rates: Complexes = np.array(-decay + 1j * frequencies, dtype=np.complex128)
     return rates
+
+
+def neutral_system(terms: int, damping: float, length: float) -> DelaySystem:
+    """Return the neutral delay system xdot(t) = +- exp(-damping length) xdot(t - length).
+
+    Its roots are those of `neutral_roots`, without end, and 0: a constant has no derivative.
+
+    Args:
+        terms: Number of real terms, whose parity decides the sign.
+        damping: a > 0 [1/s].
+        length: L > 0 [s].
+
+    Raises:
+        RangeError: A number is out of range.
+    """
+    decay, period = as_positive("damping", damping), as_positive("length", length)
+    sign = 1.0 if terms % 2 else -1.0
+    strength = sign * math.exp(-decay * period)
+    none = np.zeros(0)
+    return DelaySystem(none, none, None, np.array([period]), np.array([strength]))
 
 
 def neutral_rates(

@@ -201,9 +201,10 @@ class PiecewisePolynomial:
         value: Complexes = np.zeros(len(rates), dtype=np.complex128)
         slope: Complexes = np.zeros(len(rates), dtype=np.complex128)
         # Cells of one width share the wave inside the cell.
-        widths, groups = np.unique(np.round(halves, 12), return_inverse=True)
-        for group, half in enumerate(widths):
-            cells = np.flatnonzero(groups == group)
+        kinds = np.round(halves / halves.max(), 12)
+        for kind in np.unique(kinds):
+            cells = np.flatnonzero(kinds == kind)
+            half = float(halves[cells[0]])
             reach = float(np.abs(rates).max()) * half
             # A wave exp(-z v) on [-1, 1] needs about 0.7 |z| nodes, and then each a new digit.
             nodes, weights = gauss_legendre(int(0.75 * reach + 0.5 * self.degree) + 18)

@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Linear delay differential equations: xdot(t) = sum_j c_j x(t - tau_j) + int p(tau) x(t - tau).
+"""Linear delay differential equations, retarded or neutral.
 
-Inserting x = exp(lambda t) gives the characteristic function
-h(lambda) = lambda - sum_j c_j exp(-lambda tau_j) - int p(tau) exp(-lambda tau) dtau;
-its zeros, the characteristic roots, are the rates that solutions can have.
+xdot(t) = sum_i d_i xdot(t - sigma_i) + sum_j c_j x(t - tau_j) + int p(tau) x(t - tau) dtau
+
+Inserting x = exp(lambda t) gives the characteristic function h(lambda) =
+lambda (1 - sum_i d_i exp(-lambda sigma_i)) - sum_j c_j exp(-lambda tau_j)
+- int p(tau) exp(-lambda tau) dtau; its zeros, the characteristic roots, are the rates that
+solutions can have. Without delayed derivatives (d = 0) the equation is retarded and has finitely
+many roots to the right of any vertical line; chains of roots of a neutral one go up without end.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,11 +40,13 @@ class DelaySystem:
         delays: Shape (k,), tau_j >= 0 [s].
         strengths: Shape (k,), c_j [1/s].
         pieces: The distributed feedback p [1/s^2], or None.
+        neutral_delays: Shape (l,), sigma_i > 0 [s], of delayed derivatives; none by default.
+        neutral_strengths: Shape (l,), d_i, without a unit.
 
     Raises:
         ShapeError: Delays and strengths are not lists of one length.
         NotFiniteError: A number is NaN or infinite.
-        RangeError: A delay is negative, or there is no feedback at all.
+        RangeError: A delay is negative (of a derivative: not above 0), or there is no feedback.
 
     Example:
         >>> DelaySystem(delays=[6.0], strengths=[-0.1]).max_delay
@@ -50,30 +56,58 @@ class DelaySystem:
     delays: Floats
     strengths: Floats
     pieces: PiecewisePolynomial | None = None
+    neutral_delays: Floats = field(default_factory=lambda: np.zeros(0))
+    neutral_strengths: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         """Check the delays and strengths and make them read-only."""
-        delays = as_floats("delays", self.delays).copy()
-        strengths = as_floats("strengths", self.strengths).copy()
-        if delays.ndim != 1 or delays.shape != strengths.shape:
-            raise ShapeError(
-                f"delays and strengths must have one shape (k,), "
-                f"got {delays.shape} and {strengths.shape}"
-            )
-        if (delays < 0.0).any():
-            raise RangeError(f"delays must be at least 0, got {float(delays.min())}")
-        if not strengths.any() and self.pieces is None:
+        for kind in ("", "neutral_"):
+            delays = as_floats(f"{kind}delays", getattr(self, f"{kind}delays")).copy()
+            strengths = as_floats(f"{kind}strengths", getattr(self, f"{kind}strengths")).copy()
+            if delays.ndim != 1 or delays.shape != strengths.shape:
+                raise ShapeError(
+                    f"{kind}delays and {kind}strengths must have one shape (k,), "
+                    f"got {delays.shape} and {strengths.shape}"
+                )
+            if (delays < 0.0).any():
+                raise RangeError(f"{kind}delays must be at least 0, got {float(delays.min())}")
+            delays.setflags(write=False)
+            strengths.setflags(write=False)
+            object.__setattr__(self, f"{kind}delays", delays)
+            object.__setattr__(self, f"{kind}strengths", strengths)
+        if (self.neutral_delays == 0.0).any():
+            raise RangeError("neutral_delays must be above 0: a derivative cannot feed on itself")
+        if not (self.strengths.any() or self.neutral_strengths.any()) and self.pieces is None:
             raise RangeError("a delay system needs a feedback: a strength or a polynomial")
-        delays.setflags(write=False)
-        strengths.setflags(write=False)
-        object.__setattr__(self, "delays", delays)
-        object.__setattr__(self, "strengths", strengths)
 
     @property
     def max_delay(self) -> float:
-        """Largest delay that acts [s]."""
-        discrete = float(self.delays.max(initial=0.0))
-        return discrete if self.pieces is None else max(discrete, float(self.pieces.edges[-1]))
+        """Largest delay that acts, that is, whose strength is not 0 [s]."""
+        acting = [
+            self.delays[self.strengths != 0.0],
+            self.neutral_delays[self.neutral_strengths != 0.0],
+        ]
+        if self.pieces is not None:
+            acting.append(self.pieces.edges[1:][self.pieces.coefficients.any(axis=1)])
+        return float(np.concatenate(acting).max(initial=0.0))
+
+    def in_unit_of(self, unit: float) -> DelaySystem:
+        """Return the same system with times counted in a unit of `unit` seconds.
+
+        Its roots are these times the unit.
+        """
+        pieces = self.pieces
+        if pieces is not None:
+            pieces = PiecewisePolynomial(
+                pieces.edges / unit, pieces.coefficients * unit**2, pieces.residual * unit**2
+            )
+        return DelaySystem(
+            self.delays / unit,
+            self.strengths * unit,
+            pieces,
+            self.neutral_delays / unit,
+            self.neutral_strengths,
+        )
 
     def characteristic(self, rates: ArrayLike) -> Complexes:
         """Return h(lambda) [1/s] for rates lambda [1/s] of any shape."""
@@ -94,6 +128,11 @@ class DelaySystem:
         echoes = np.exp(np.multiply.outer(-rates, self.delays))
         value: Complexes = rates - echoes @ self.strengths
         slope: Complexes = echoes @ (self.strengths * self.delays) + np.complex128(1.0)
+        if len(self.neutral_delays):
+            late = np.exp(np.multiply.outer(-rates, self.neutral_delays))
+            share = late @ self.neutral_strengths
+            value = value - rates * share
+            slope = slope - share + rates * (late @ (self.neutral_strengths * self.neutral_delays))
         if self.pieces is not None:
             distributed, distributed_slope = self.pieces.transform(rates)
             value = value - distributed
@@ -106,14 +145,35 @@ class DelaySystem:
         For them |lambda| = |sum c exp(-lambda tau) + int p exp(-lambda t)|, and the right side is
         at most the same with absolute values at Re lambda = `real_part`. Integrated by parts
         the second term falls as 1 / |lambda|, which makes the far smaller bound at high
-        frequencies.
+        frequencies. A neutral system has such a radius only where sum |d| exp(-Re lambda sigma)
+        is below 1, by whose distance from 1 the right side is divided; else it is infinite.
         """
-        discrete = float(np.abs(self.strengths) @ np.exp(-real_part * self.delays))
+        late = np.abs(self.neutral_strengths) @ np.exp(-real_part * self.neutral_delays)
+        left = 1.0 - float(late)
+        if left <= 0.0:
+            return math.inf
+        discrete = float(np.abs(self.strengths) @ np.exp(-real_part * self.delays)) / left
         if self.pieces is None:
             return discrete
-        plain = discrete + self.pieces.absolute_transform(real_part)
-        falling = self.pieces.variation_transform(real_part)
+        plain = discrete + self.pieces.absolute_transform(real_part) / left
+        falling = self.pieces.variation_transform(real_part) / left
         return min(plain, 0.5 * (discrete + math.sqrt(discrete**2 + 4.0 * falling)))
+
+    def magnitude(self, rates: Complexes) -> Floats:
+        """Return the sum of the sizes of the terms of h, shape (n,), whose rounding it has."""
+        size = np.abs(rates)
+        size = size * (
+            1.0
+            + np.exp(np.multiply.outer(-rates.real, self.neutral_delays))
+            @ np.abs(self.neutral_strengths)
+        )
+        size = size + np.exp(np.multiply.outer(-rates.real, self.delays)) @ np.abs(self.strengths)
+        if self.pieces is not None:
+            places, inverse = np.unique(np.round(rates.real, 2), return_inverse=True)
+            parts = np.array([self.pieces.absolute_transform(place) for place in places.tolist()])
+            size = size + parts[inverse]
+        total: Floats = size
+        return total
 
 
 def from_quasi_polynomial(rows: ArrayLike, cell: float = 1.0) -> DelaySystem:
