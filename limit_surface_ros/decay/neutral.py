@@ -129,4 +129,5 @@ def neutral_rates(
     )
     damping, length = (float(value) for value in np.exp(result.x))
     parameters = {"damping": damping, "length": length}
-    return judged(rates_of(result.x), response, end, "neutral", None, parameters)
+    system = None if len(tail) else neutral_system(free, max(damping, LEAST_DECAY / end), length)
+    return judged(rates_of(result.x), response, end, "neutral", system, parameters)

@@ -37,8 +37,8 @@ GOOD, FAIR = 0.6, 0.2
 WIDENED, NARROWED, HALTED = 2.0, 0.4, 0.25
 # A step that promises less than this part of the error is not worth taking.
 LEAST_HOPE = 1e-4
-# The mobility of a rate that is not damped [1/s].
-LEAST_MOBILITY = 0.3
+# The mobility of a rate that is not damped, over the interval.
+LEAST_MOBILITY = 5.7
 MOST_STEPS = 100
 # Polishing ends when this many steps in a row gained less than this part of the error.
 STALL, LEAST_GAIN = 6, 1e-3
@@ -138,6 +138,8 @@ class _Problem:
             self.target = np.append(self.target, np.zeros(len(tail)))
             self.weights = np.ones(len(self.times))
         self.least_decay = least_decays / end
+        # How far a rate may move in a step of radius 1 [1/s]: about as far as it is damped.
+        self.least_mobility = LEAST_MOBILITY / end
         self.base = np.zeros(len(self.times), dtype=bool)
         self.base[:: max(1, len(self.times) // max(300, 6 * count_terms(rates)))] = True
         self.seen = self.base
@@ -181,7 +183,8 @@ class _Problem:
         tangents = np.concatenate([waves.real, -waves.imag[:, is_pair]], axis=1)
         tangents *= self.weights[seen, np.newaxis]
         basis *= self.weights[seen, np.newaxis]
-        reach = radius * np.concatenate([_mobility(point.rates), _mobility(point.rates[is_pair])])
+        mobility = self.least_mobility + np.abs(point.rates.real)
+        reach = radius * np.concatenate([mobility, mobility[is_pair]])
         # In units of its reach each change of a rate is a row that weighs as much as the error.
         terms, moves = basis.shape[1], tangents.shape[1]
         matrix = np.zeros((len(times) + moves, terms + moves))
@@ -195,12 +198,6 @@ class _Problem:
         rates[is_pair] += 1j * change[len(point.rates) :]
         rates = np.minimum(rates.real, -self.least_decay) + 1j * np.abs(rates.imag)
         return self.fitted(rates), solution.value
-
-
-def _mobility(rates: Complexes) -> Floats:
-    """How far a rate may move in a step of radius 1 [1/s]: about as far as it is damped."""
-    mobility: Floats = LEAST_MOBILITY + np.abs(rates.real)
-    return mobility
 
 
 def _peaks(errors: Floats) -> Bools:

@@ -177,6 +177,15 @@ class Analytic:
 Target: TypeAlias = PiecewiseLinear | Analytic
 
 
+def in_unit_of(response: Target, unit: float) -> Target:
+    """Return a response with times counted in a unit of `unit` seconds."""
+    if isinstance(response, PiecewiseLinear):
+        return PiecewiseLinear(response.knots / unit, response.values)
+    return Analytic(
+        lambda t: response.function(t * unit), response.breakpoints / unit, response.shape
+    )
+
+
 def require_onset(value: float) -> None:
     """Refuse a response that is zero at its onset: xdot = f * x then has no solution f.
 

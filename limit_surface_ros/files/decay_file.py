@@ -12,6 +12,8 @@ A file is YAML::
       strengths: [-1.0, 1.0]           # [1/s]
       edges: [0.0, 1.0, ...]           # optional: the distributed feedback's cells [s]
       legendre: [[...], ...]           # one row of coefficients for each cell
+      neutral_delays: [1.3]            # optional: delayed derivatives [s]
+      neutral_strengths: [0.2]         # optional: their strengths
     time_span: [0.0, 6.0]              # [s], where the error was measured
     norm: inf
     max_error: 0.0282                  # in the unit of x
@@ -219,6 +221,8 @@ def _read_system(section: Section) -> DelaySystem:
     strengths = section.array("strengths", (None,), empty)
     edges = section.array("edges", (None,), None)
     series = section.array("legendre", (None, None), None)
+    late = section.array("neutral_delays", (None,), empty)
+    shares = section.array("neutral_strengths", (None,), empty)
     section.finish()
     if (edges is None) != (series is None):
         raise section.error("edges", "edges and legendre belong together: give both or none")
@@ -226,7 +230,7 @@ def _read_system(section: Section) -> DelaySystem:
     if edges is not None:
         pieces = place_errors(section, "edges", lambda: PiecewisePolynomial(edges, series))
     system: DelaySystem = place_errors(
-        section, "delays", lambda: DelaySystem(delays, strengths, pieces)
+        section, "delays", lambda: DelaySystem(delays, strengths, pieces, late, shares)
     )
     return system
 
@@ -243,6 +247,11 @@ def _system_values(system: DelaySystem) -> dict[str, Any]:
     values: dict[str, Any] = {}
     if len(system.delays):
         values |= {"delays": system.delays, "strengths": system.strengths}
+    if len(system.neutral_delays):
+        values |= {
+            "neutral_delays": system.neutral_delays,
+            "neutral_strengths": system.neutral_strengths,
+        }
     if system.pieces is not None:
         values |= {"edges": system.pieces.edges, "legendre": system.pieces.coefficients}
     return values

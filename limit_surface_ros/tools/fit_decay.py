@@ -30,6 +30,7 @@ from limit_surface_ros.files.decay_file import DecayModel, write_decay_model
 from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
 from limit_surface_ros.tools.csv_options import OF_RESPONSES
 from limit_surface_ros.tools.decay_input import add_input_options, read_input
+from limit_surface_ros.tools.delay_report import system_in_words
 from limit_surface_ros.tools.options import check_output, refuse_empty, refuse_unused
 from limit_surface_ros.tools.program import run_program
 from limit_surface_ros.tools.training_data import is_bag
@@ -107,6 +108,12 @@ def parser() -> argparse.ArgumentParser:
         help="of the coefficients' fit; auto: 2 after least_squares, else inf",
     )
     add_method_options(top)
+    top.add_argument(
+        "--show-system",
+        action="store_true",
+        help="print the delay system of the rates: its impulses, its pieces (also as monomials), "
+        "its characteristic equation and its roots (dde)",
+    )
     return top
 
 
@@ -363,7 +370,8 @@ def refuse_options_of_others(options: argparse.Namespace) -> None:
     if options.input in RESPONSES or is_bag(Path(options.input)):
         refuse_unused(top, options, OF_RESPONSES, "for a CSV file")
     if options.method != "dde":
-        refuse_unused(top, options, ["max_delay", "degree", "allow_unstable"], "for --method dde")
+        of_dde = ["max_delay", "degree", "allow_unstable", "show_system"]
+        refuse_unused(top, options, of_dde, "for --method dde")
     if options.method not in ("least_squares", "best"):
         refuse_unused(top, options, ["keep_outliers"], "for --method least_squares or best")
         if options.offset == FREE:
@@ -396,6 +404,8 @@ def run(options: argparse.Namespace) -> None:
     if options.output is not None:
         model = model_of(result, given, options.name or options.output.stem)
     report(result, given)
+    if options.show_system and result.choice.system is not None:
+        print(system_in_words(result.choice.system, result.choice.rates))
     for doubt in doubts(result, given):
         print(f"fit_decay: warning: {doubt}", file=sys.stderr)
     if model is not None:

@@ -7,8 +7,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
+from limit_surface_ros.decay import examples
+from limit_surface_ros.decay.delay.construction import delay_system
 from limit_surface_ros.decay.delay.pieces import PiecewisePolynomial
-from limit_surface_ros.decay.delay.system import DelaySystem, from_quasi_polynomial
+from limit_surface_ros.decay.delay.roots import first_roots
+from limit_surface_ros.decay.delay.system import (
+    DelaySystem,
+    from_quasi_polynomial,
+    quasi_polynomial,
+)
+from limit_surface_ros.decay.neutral import neutral_system
 from limit_surface_ros.errors import DataError, RangeError, ShapeError
 
 seeds = st.integers(min_value=0, max_value=2**32 - 1)
@@ -126,3 +134,25 @@ def test_samples_on_a_jump_do_not_spoil_the_pieces():
 def test_bad_systems_are_refused_with_the_reason(build, error, message):
     with pytest.raises(error, match=message):
         build()
+
+
+def test_the_printed_equation_and_polynomials_come_back():
+    delays, rows = quasi_polynomial(examples.thesis_system())
+    np.testing.assert_allclose(delays, np.arange(7.0))
+    np.testing.assert_allclose(rows, examples.THESIS_EQUATION, atol=1e-9)
+    monomials = examples.printed_system().pieces.monomials()
+    np.testing.assert_allclose(monomials, examples.THESIS_POLYNOMIALS, atol=1e-9)
+
+
+def test_the_equation_has_the_roots_of_the_system():
+    system = delay_system(examples.four_impulses(), 3.0, degree=3)
+    delays, rows = quasi_polynomial(system)
+    for root in first_roots(system, 4):
+        powers = root ** np.arange(rows.shape[1] - 1.0, -1.0, -1.0)
+        right = (np.exp(-delays * root) * (rows @ powers)).sum()
+        assert abs(right / root ** rows.shape[1] - 1.0) < 1e-6
+
+
+def test_a_neutral_system_is_not_printed_as_what_it_is_not():
+    with pytest.raises(DataError, match="neutral"):
+        quasi_polynomial(neutral_system(5, 1.0, 1.0))

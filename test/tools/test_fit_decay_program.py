@@ -369,3 +369,52 @@ def test_the_record_is_never_overwritten(tmp_path, capsys):
     assert fit_decay.main([str(record), "-n", "2", "-o", str(record)]) == 2
     assert "is the input" in capsys.readouterr().err
     assert record.read_bytes() == before
+
+
+def test_the_delay_system_is_shown_when_asked_for(capsys):
+    chosen = ["--method", "dde", "--max-delay", "6", "--degree", "5", "--show-system"]
+    assert fit_decay.main(["f1", "-n", "5", *chosen]) == 0
+    printed = capsys.readouterr().out
+    assert "  -1 1/s at 0 s\n  +1 1/s at 1 s\n" in printed
+    assert "pieces as polynomials in t, coefficients of t^5, t^4, t^3, t^2, t^1, 1:" in printed
+    assert "  l^7 =\n    + (-1 l^6 - " in printed
+    assert "    + exp(-6 l) (" in printed
+    assert re.search(r"^  -2\.0\d+ \+0\.5\d+i 1/s$", printed, re.MULTILINE)
+    assert fit_decay.main(["f1", "-n", "5", "--show-system"]) == 2
+    assert "--show-system is for --method dde" in capsys.readouterr().err
+
+
+def test_outliers_noise_and_terms_are_told_and_written(tmp_path, capsys):
+    record, times = tmp_path / "record.csv", np.linspace(0.0, 5.0, 501)
+    values = 5.0 * np.exp(-2.0 * times) + 0.02 * np.random.default_rng(2).normal(size=501)
+    values[[60, 200, 333]] += [4.0, -3.0, 3.5]
+    record.write_text("\n".join(f"{t},{x}" for t, x in zip(times, values, strict=True)))
+    output = tmp_path / "model.yaml"
+    assert fit_decay.main([str(record), "-n", "auto", "-o", str(output)]) == 0
+    printed = capsys.readouterr().out
+    assert "3 samples left out, at 0.6, 2, 3.33 s" in printed
+    assert "BIC above the least: 1 terms 0.0, 2 terms" in printed
+    assert re.search(r"^assumed +after 5 s the response stays within", printed, re.MULTILINE)
+    model = read_decay_model(output)
+    assert model.norm == "2"
+    assert model.noise == pytest.approx(0.02, rel=0.15)
+    assert model.fit["outlier_times"] == [0.6, 2.0, 3.33]
+    assert model.tail.bound < 0.001 < model.tail.envelope
+
+
+def test_a_free_offset_is_fitted_as_a_constant(tmp_path, capsys):
+    record = write_offset(tmp_path / "record.csv", 1.5, 0.01)
+    output = tmp_path / "model.yaml"
+    assert fit_decay.main([str(record), "-n", "1", "--offset", "free", "-o", str(output)]) == 0
+    assert read_decay_model(output).sum.constant == pytest.approx(1.5, abs=0.01)
+    assert re.search(r"^constant +1\.\d+, to which the sum decays", capsys.readouterr().out, re.M)
+    refused = ["-n", "1", "--offset", "free", "--method", "esprit"]
+    assert fit_decay.main([str(record), *refused]) == 2
+    assert "--offset free is for" in capsys.readouterr().err
+
+
+def test_a_growing_record_is_refused(tmp_path, capsys):
+    record, times = tmp_path / "record.csv", np.linspace(0.0, 6.0, 61)
+    record.write_text("\n".join(f"{t},{np.exp(0.3 * t)}" for t in times))
+    assert fit_decay.main([str(record), "-n", "2"]) == 2
+    assert "the response grows" in capsys.readouterr().err

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,7 @@ from limit_surface_ros.decay.delay.impulses import find_impulses
 from limit_surface_ros.decay.delay.kernel import memory_kernel
 from limit_surface_ros.decay.delay.pieces import PiecewisePolynomial
 from limit_surface_ros.decay.delay.system import DelaySystem
-from limit_surface_ros.decay.targets import PiecewiseLinear, uniform_times
+from limit_surface_ros.decay.targets import PiecewiseLinear, in_unit_of, uniform_times
 from limit_surface_ros.errors import DataError, RangeError
 
 if TYPE_CHECKING:
@@ -56,6 +57,13 @@ def delay_system(
     span = as_positive("max_delay", max_delay)
     if degree is not None and not 0 <= degree <= MOST_DEGREE:
         raise RangeError(f"degree must be a whole number from 0 to {MOST_DEGREE}, got {degree}")
+    # In a unit of about the delay, a power of two, so that no time scale is better than another.
+    unit = 2.0 ** round(math.log2(span))
+    scaled = in_unit_of(response, unit)
+    return _delay_system(scaled, span / unit, degree, samples).in_unit_of(1.0 / unit)
+
+
+def _delay_system(response: Target, span: float, degree: int | None, samples: int) -> DelaySystem:
     if isinstance(response, PiecewiseLinear) and len(response.knots) <= MOST_KNOTS:
         try:
             kernel = ClosedKernel(response, span)

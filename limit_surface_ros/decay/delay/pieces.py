@@ -219,6 +219,39 @@ class PiecewisePolynomial:
             slope -= (moment * shifts).sum(axis=1)
         return value, slope
 
+    def monomials(self) -> Floats:
+        """Return the polynomials in t as they are printed, shape (cells, degree + 1).
+
+        Highest power first, with t from the origin as in `from_monomials`; cells far from the
+        origin cancel, so that printed digits are worth less there.
+        """
+        rows = np.zeros_like(self.coefficients)
+        halves = 0.5 * np.diff(self.edges)
+        centres = self.edges[:-1] + halves
+        for row, series, centre, half in zip(
+            rows, self.coefficients, centres.tolist(), halves.tolist(), strict=True
+        ):
+            line = np.polynomial.Polynomial([-centre / half, 1.0 / half])
+            powers = np.polynomial.Polynomial(legendre.leg2poly(series))(line).coef
+            row[self.degree + 1 - len(powers) :] = powers[::-1]
+        return rows
+
+    def jumps(self) -> Floats:
+        """Return by how much each derivative jumps at each edge, shape (edges, degree + 1).
+
+        Column m is the m-th derivative; the function is zero outside of the cells.
+        """
+        halves = 0.5 * np.diff(self.edges)
+        jumps = np.zeros((len(self.edges), self.degree + 1))
+        series = self.coefficients
+        for order in range(self.degree + 1):
+            ends = series.sum(axis=1)
+            starts = series @ (-1.0) ** np.arange(series.shape[1])
+            jumps[:, order] = np.append(starts, 0.0) - np.append(0.0, ends)
+            if order < self.degree:
+                series = legendre.legder(series, axis=1) / halves[:, np.newaxis]
+        return jumps
+
     def absolute_transform(self, rate: float) -> float:
         """Return an upper bound on the integral of |p(t)| exp(-rate t), for a real rate."""
         halves = 0.5 * np.diff(self.edges)

@@ -95,7 +95,7 @@ def _best_order(
 ) -> RateChoice:
     """Return the better of the first roots by imaginary part and by real part."""
     if not allow_unstable:
-        require_stable(system)
+        _require_stable(system, response)
     choices = []
     for order, roots in _selections(system, terms):
         rates = take(roots, terms)
@@ -106,6 +106,20 @@ def _best_order(
     if not choices:
         raise SolverError(f"{terms} term(s) cannot hold any of the roots found")
     return min(choices, key=lambda choice: choice.error)
+
+
+def _require_stable(system: DelaySystem, response: Target) -> None:
+    """Refuse an unstable system, and tell whether the response or its kernel is the cause."""
+    try:
+        require_stable(system)
+    except UnstableError as error:
+        # `require_minimum_phase` has passed: the response's own kernel decays.
+        raise DataError(
+            f"{error}, though the response is minimum-phase: its kernel is not met well enough up "
+            f"to the delay {system.max_delay:.4g} s (a steep start, or a memory that is longer). "
+            "Give another maximum delay, or use a method that needs no kernel (best, esprit, "
+            "neutral)"
+        ) from None
 
 
 def _selections(system: DelaySystem, terms: int) -> list[tuple[str, Complexes]]:

@@ -35,7 +35,7 @@ def count_unstable_roots(system: DelaySystem, margin: float = 0.0) -> int:
     Raises:
         SolverError: A root lies on the line Re lambda = -margin.
     """
-    reach = system.root_bound(-margin) * 1.001 + 1e-6
+    reach = system.root_bound(-margin) * 1.001 + 1e-6 / (system.max_delay or 1.0)
     return count_roots(system, (-margin, reach), (0.0, reach))
 
 

@@ -176,6 +176,34 @@ class DelaySystem:
         return total
 
 
+def quasi_polynomial(system: DelaySystem) -> tuple[Floats, Floats]:
+    """Return the characteristic equation as it is printed, the inverse of `from_quasi_polynomial`.
+
+    It is lambda^(d+2) = sum_k exp(-a_k lambda) sum_m rows[k, m] lambda^(d+1-m), with the degree d
+    of the pieces; without pieces lambda = sum_k exp(-a_k lambda) rows[k, 0].
+
+    Args:
+        system: A retarded system.
+
+    Returns:
+        The delays a_k [s], shape (n,), increasing, and the rows, shape (n, d + 2); without
+        pieces (n, 1).
+
+    Raises:
+        DataError: The system is neutral.
+    """
+    if len(system.neutral_delays):
+        raise DataError("a neutral system has no equation of this form: its h has more terms")
+    edges = np.zeros(0) if system.pieces is None else system.pieces.edges
+    delays = np.unique(np.concatenate([system.delays, edges]))
+    width = 1 if system.pieces is None else system.pieces.degree + 2
+    rows = np.zeros((len(delays), width))
+    np.add.at(rows[:, 0], np.searchsorted(delays, system.delays), system.strengths)
+    if system.pieces is not None:
+        rows[np.searchsorted(delays, edges), 1:] += system.pieces.jumps()
+    return delays, rows
+
+
 def from_quasi_polynomial(rows: ArrayLike, cell: float = 1.0) -> DelaySystem:
     """Recover the delay system from a printed characteristic equation.
 
