@@ -381,7 +381,7 @@ def test_the_delay_system_is_shown_when_asked_for(capsys):
     assert "    + exp(-6 l) (" in printed
     assert re.search(r"^  -2\.0\d+ \+0\.5\d+i 1/s$", printed, re.MULTILINE)
     assert fit_decay.main(["f1", "-n", "5", "--show-system"]) == 2
-    assert "--show-system is for --method dde" in capsys.readouterr().err
+    assert "--show-system does nothing here" in capsys.readouterr().err
 
 
 def test_outliers_noise_and_terms_are_told_and_written(tmp_path, capsys):
