@@ -190,8 +190,8 @@ class Rollout:
         new = hit[np.isnan(self.touched_at[hit])]
         self.touched_at[new] = self._done_lengths[new]
         self.left_at[hit] = np.nan
-        if len(hit):
-            self._keep(hit)
+        self._rates[rows] = 0.0
+        self._keep(rows)
 
     def _take_steps(self, rows: Places, corner: bool) -> None:
         """Try one step of each push, and keep those that are good enough."""
@@ -201,6 +201,7 @@ class Rollout:
             rate, closing = self._rate(fresh, self.poses[fresh], tip, direction, corner)
             self._rates[fresh], self._closing[fresh] = rate, closing
             self._fresh[fresh] = False
+            self._keep(fresh)
         tip, direction, rest = self._ways(rows)
         step = np.minimum(self._step[rows], rest)
         h, way = step[:, np.newaxis], step * direction
@@ -226,8 +227,8 @@ class Rollout:
         self.poses[taken], self._rates[taken] = end[good], k4[good]
         self.errors[taken] += error[good]
         self._advance(taken, step[good], step[good] >= rest[good])
-        self._follow_up(taken, closing[good], step[good])
         self._keep(taken)
+        self._follow_up(taken, closing[good], step[good])
 
     def _follow_up(self, rows: Places, closing: Floats, steps: Floats) -> None:
         """Find which tips have left, and which now touch at two places."""
@@ -245,6 +246,7 @@ class Rollout:
                 # Nothing bends back into the way of a tip that goes straight on.
                 _, _, rest = self._ways(free)
                 self._advance(free, rest, np.ones(len(free), dtype=bool))
+                self._keep(free)
                 on = self._phase[rows] != _DONE
         self._closing[rows] = closing
         # A new direction may lead away.
