@@ -35,6 +35,8 @@ OVERLAPS = ("keep", "push_out")
 # Depth of a tip's centre within an outline, in mean radii, that no error of a pose explains.
 _DEEPEST = 0.25
 _PARTINGS = 30
+# Motions that are searched for in a push, at least.
+_SEARCHES = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,6 +273,9 @@ class _Batch:
         """Yield blocks of pushes that have reached their ends, at least one."""
         if paths.shape[2:] != (2,) or paths.shape[1] < 2:
             raise ShapeError(f"a path has shape (m, 2) with m at least 2, got {paths.shape[1:]}")
+        if self._scene.surface.wrench_is_closed:
+            # Sliding pushes search for their motions: many together pay for a table.
+            self._scene.surface.shape.expect(_SEARCHES * len(poses))
         for start in range(0, max(len(poses), 1), _BLOCK):
             block = slice(start, start + _BLOCK)
             begun, radii = self._parted(poses[block], paths[block, 0])
