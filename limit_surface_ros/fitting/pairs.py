@@ -156,8 +156,14 @@ def check_support(pairs: ScaledPairs, parameters: int) -> None:
             "friction only takes power in; are the wrenches those on the pusher, or the twists "
             "reversed?"
         )
-    moments = np.linalg.eigvalsh(pairs.directions.T @ pairs.directions / count)
+    moments, axes = np.linalg.eigh(pairs.directions.T @ pairs.directions / count)
     if moments[-1] > _ONE_DIRECTION:
+        if abs(axes[2, -1]) > _PURE:
+            raise DataError(
+                "all motions are turns on the spot: next to a characteristic length of "
+                f"{pairs.scaling.characteristic_length:g} m the velocities are nothing; are that "
+                "length in metres and the angular velocities in rad/s?"
+            )
         raise DataError(
             "all motions go in one direction: they cannot determine a surface; "
             "push and turn the body in several directions"

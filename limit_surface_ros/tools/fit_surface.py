@@ -73,13 +73,19 @@ def parser() -> argparse.ArgumentParser:
 
 
 def report(fitted: FittedModel, output: Path) -> None:
-    """Print what was dropped, cost, errors and time."""
+    """Print what was dropped, what the model is, cost, errors and time."""
     result = fitted.result
     for note in fitted.model.fit.get("read", ()):
         print(f"read        {note}")
     for rule, count in fitted.model.fit.get("dropped", {}).items():
         if count:
             print(f"dropped     {count} of {fitted.model.fit['wrenches']} wrenches {rule}")
+    model = fitted.model
+    x, y = model.reference_point
+    print(f"{'model':<11} {model.name}, {model.surface.kind}")
+    print(f"{'about':<11} ({x:.4g}, {y:.4g}) m in frame {model.frame_id}")
+    for label, text in fitted.description.lines():
+        print(f"{label:<11} {text}")
     state = "converged" if result.converged else "not converged"
     print(f"objective   {result.objective}")
     print(f"cost        {result.cost:.6g}, {state} after {result.iterations} steps")
@@ -131,7 +137,7 @@ def run(options: argparse.Namespace) -> None:
     command = shlex.join(["fit_surface", *options.command])
     write_surface_model(fitted.model, options.output, header=f"Made by: {command}")
     report(fitted, options.output)
-    for doubt in fitted.doubts:
+    for doubt in fitted.description.doubts:
         warnings.warn(f"{options.input}: {doubt}", stacklevel=2)
 
 
