@@ -4,7 +4,8 @@
 Keys: `schema: 1`, `name`, `frame_id` (default "object"), `reference_point` ("centroid", the
 default, or [x, y] in metres), `symmetry` ("auto", the default, "none", or a list of the axes x
 and y about which a fitted model is to be its own mirror image), and one of two descriptions. All
-lengths are metres, forces newtons.
+lengths are metres, forces newtons. `outline` (optional, see `outline_section`) is that of the
+body, which pushers touch; if it is not given it is the rim of the shape.
 
 Support points: `points` ([x, y] each) and what each can resist with, one of
   `friction_limits`: mu N of each; `normal_force` of the whole body is optional: it tells at which
@@ -31,6 +32,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limit_surface_ros.files.outline_section import outline_of_shape, read_outline
 from limit_surface_ros.files.section import place_errors
 from limit_surface_ros.files.yaml_reader import read_yaml
 from limit_surface_ros.surface.contact import pressure as pressures
@@ -46,6 +48,7 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.files.section import Section
+    from limit_surface_ros.motion.outline import Outline
     from limit_surface_ros.surface.contact.pressure import Pressure
     from limit_surface_ros.surface.contact.shapes import Cells
 
@@ -73,6 +76,7 @@ class ContactModel:
         symmetry: Of the axes "x" and "y" those about which a model of it is to be symmetric.
         load_method: How the loads of the feet were found, if they were; see `support_loads`.
         doubts: What is not impossible but looks like a slip, such as other units; sentences.
+        outline: Of the body, which pushers touch: given, or the rim of its shape; None otherwise.
     """
 
     name: str
@@ -84,6 +88,7 @@ class ContactModel:
     symmetry: tuple[str, ...] = ()
     load_method: str | None = None
     doubts: tuple[str, ...] = ()
+    outline: Outline | None = None
 
 
 def read_contact(path: str | Path) -> ContactModel:
@@ -107,8 +112,12 @@ def read_contact(path: str | Path) -> ContactModel:
     else:
         raise section.error("points", f"missing; {_ACCEPTED}")
     symmetry, unlike = _read_symmetry(section, model.surface)
+    if "outline" in section:
+        outline: Outline | None = read_outline(section)
+    else:
+        outline = outline_of_shape(section.section("shape")) if "shape" in section else None
     section.finish()
-    return replace(model, symmetry=symmetry, doubts=(*model.doubts, *unlike))
+    return replace(model, symmetry=symmetry, doubts=(*model.doubts, *unlike), outline=outline)
 
 
 def doubts_of_contact(surface: PointContacts, friction_coefficient: float | None) -> list[str]:

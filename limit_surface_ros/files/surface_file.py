@@ -2,10 +2,11 @@
 """Surface model files: a limit surface with its name, frame and history, in YAML.
 
 Keys: `schema: 1`, `name`, `kind`, `frame_id`, `reference_point` [m], `characteristic_length` [m],
-`friction_force` [N], `normal_force` [N] (optional), `fit` (how the model came about; free), and
-last the arrays that the kind declares, with the whole numbers that count them: `terms`,
-`exponents` and `matrices` of a power_sum, `terms` and `matrices` of a dissipation, `points` [m]
-and `friction_limits` [N] of point_contacts, `coefficients` of a polynomial in the order of
+`friction_force` [N], `normal_force` [N] (optional), `outline` (of the body, optional; see
+`outline_section`), `fit` (how the model came about; free), and last the arrays that the kind
+declares, with the whole numbers that count them: `terms`, `exponents` and `matrices` of a
+power_sum, `terms` and `matrices` of a dissipation, `points` [m] and `friction_limits` [N] of
+point_contacts, `coefficients` of a polynomial in the order of
 `surface.kinds.polynomial.MONOMIALS`. Because these come last and are counted, a file cut short
 anywhere is refused.
 """
@@ -19,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from limit_surface_ros.checks import as_positive
 from limit_surface_ros.errors import RangeError
+from limit_surface_ros.files.outline_section import outline_values, read_outline
 from limit_surface_ros.files.section import Section, place_errors
 from limit_surface_ros.files.yaml_reader import read_yaml, write_yaml
 from limit_surface_ros.surface.convexity import Convexity, is_convex, warn_unless_convex
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from limit_surface_ros.motion.outline import Outline
     from limit_surface_ros.surface.base import FileArray, LimitSurface
 
 SCHEMA = 1
@@ -48,6 +51,7 @@ class SurfaceModel:
         normal_force: Normal force [N] at which the surface holds, if it is known; another weight
             scales the surface.
         fit: How the model came about: objective, data, errors, date, version. Plain values.
+        outline: Of the body in that frame, which pushers touch; None if it is not known.
 
     Raises:
         RangeError: The name or the frame is empty, or the normal force not above zero.
@@ -59,6 +63,7 @@ class SurfaceModel:
     reference_point: tuple[float, float] = (0.0, 0.0)
     normal_force: float | None = None
     fit: Mapping[str, Any] = field(default_factory=dict)
+    outline: Outline | None = None
 
     def __post_init__(self) -> None:
         """Check what the surface itself does not know."""
@@ -124,6 +129,7 @@ def read_surface_model(path: str | Path) -> SurfaceModel:
         )
     )
     reference_point = section.array("reference_point", (2,), (0.0, 0.0))
+    outline = read_outline(section) if "outline" in section else None
     history = section.section("fit", {})
     arrays = _read_arrays(section, kind.arrays)
     surface = place_errors(section, kind.kind, lambda: kind.of_arrays(arrays, scaling))
@@ -134,6 +140,7 @@ def read_surface_model(path: str | Path) -> SurfaceModel:
         reference_point=(float(reference_point[0]), float(reference_point[1])),
         normal_force=section.number("normal_force", None, above=0.0),
         fit=history.values,
+        outline=outline,
     )
     section.finish()
     warn_unless_convex(model.convexity, model.name)
@@ -163,6 +170,8 @@ def write_surface_model(model: SurfaceModel, path: str | Path, header: str = "")
     }
     if model.normal_force is not None:
         values["normal_force"] = model.normal_force
+    if model.outline is not None:
+        values["outline"] = outline_values(model.outline)
     if model.fit:
         values["fit"] = dict(model.fit)
     arrays = {array.key: getattr(surface, array.key) for array in surface.arrays}

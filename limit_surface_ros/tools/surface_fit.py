@@ -295,6 +295,7 @@ def fit_model(
         frame_id=options.frame_id or data.frame_id or DEFAULT_FRAME,
         reference_point=data.reference_point,
         normal_force=data.normal_force,
+        outline=data.outline,
     )
     description = describe_fit(
         result.surface,

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.files.contact_file import ContactModel
     from limit_surface_ros.files.csv_table import CsvOptions
+    from limit_surface_ros.motion.outline import Outline
     from limit_surface_ros.surface.pairs import Pairs
 
 # What an input can be, as messages call it.
@@ -56,6 +57,7 @@ class TrainingData:
         of_points: Whether `support` is the whole contact, and no patch cut into cells.
         symmetry: Axes about which a model is to be symmetric.
         doubts: What of the source looks like a slip, sentences.
+        outline: Of the body, if the source states it.
         about: For the model file.
     """
 
@@ -71,6 +73,7 @@ class TrainingData:
     of_points: bool = False
     symmetry: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
+    outline: Outline | None = None
     about: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -223,6 +226,7 @@ def training_data_of_contact(
         of_points=contact.of_points,
         symmetry=contact.symmetry,
         doubts=contact.doubts,
+        outline=contact.outline,
         about={"data": path.name, **loads, **asdict(simulation)},
     )
 
