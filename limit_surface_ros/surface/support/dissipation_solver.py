@@ -27,6 +27,8 @@ _STARTS = 400
 FEW_TERMS = 30
 # Points from which their sums are the cost of a motion, and single precision pays.
 _MANY = 200
+# Points up to which a table is made before any large batch is there: it takes a second then.
+_TABLE_AHEAD = 1000
 # Part of a load along a free motion, above which the load causes that motion.
 _FREE = 1e-12
 # Condition of the axes in which D is round beyond which rounding would spoil its kinks.
@@ -117,7 +119,7 @@ def _solver_of_points(gauge: PointNormSum) -> SupportSolver:
     starts = even_directions(_STARTS).T
     if len(gauge.limits) >= _MANY:
         many = ManyPoints(gauge, ConvexNewton(gauge, starts))
-        return Tabulated(many, many)
+        return Tabulated(many, many, ahead=len(gauge.limits) <= _TABLE_AHEAD)
     corners = gauge.corners()
     newton = ConvexNewton(gauge, starts, corners)
     if len(gauge.limits) > FEW_TERMS:

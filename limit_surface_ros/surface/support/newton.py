@@ -110,6 +110,9 @@ def plane_minimum(
         angles[todo] = sines
         settled[todo] = last | (sines < _ACCEPTED)
         result[:, todo] = points + np.where(last, moves, 0.0)
+        # Just beyond a corner the curvature is large, and one step more makes the gradient
+        # parallel; at a kink none does. Where kinks are rounded, their length alone tells.
+        last &= (sines <= _PARALLEL) | (smoothing > 0.0)
         keep = ~last & (sines > _TARGET)
         if not keep.all():
             todo, normals, basis, smoothing, points, moves, slopes, values = kept(

@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 FEW = 24
 _STEPS = 30
 _LAST_STEP = 1e-8
-_TARGET = 1e-14
-# A larger sine before a last step may come from a kink that drew Newton's method in.
+# A step is the last if the sine before it was no larger: a kink draws Newton's method in with one.
 _PARALLEL = 1e-6
 # Power below which a unit normal is as good as across a corner's point.
 _ACROSS = 1e-9
@@ -153,12 +152,9 @@ class SmallBatch(SupportSolver):
             step_p, step_q = move
             sine = hypot(*gradient) / abs(1.0 - p * gradient[0] - q * gradient[1])
             step = hypot(*move) / sqrt(1.0 + p * p + q * q)
-            if step <= _LAST_STEP and sine > _PARALLEL:
-                return None
-            if sine > _TARGET:
-                p += step_p
-                q += step_q
-            if sine <= _TARGET or step <= _LAST_STEP:
+            p += step_p
+            q += step_q
+            if step <= _LAST_STEP and sine <= _PARALLEL:
                 x = nx + p * first[0] + q * second[0]
                 y = ny + p * first[1] + q * second[1]
                 z = nz + p * first[2] + q * second[2]

@@ -8,6 +8,7 @@ what was asked before: a call takes the same time whatever came before it.
 
 from __future__ import annotations
 
+from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,14 +28,23 @@ _PAYS_CONVEX, _PAYS = 1.3, 2.6
 class Tabulated(SupportSolver):
     """A solver with a table of its answers."""
 
-    def __init__(self, gauge: FirstOrder, solver: SupportSolver, *, convex: bool = True) -> None:
+    def __init__(
+        self,
+        gauge: FirstOrder,
+        solver: SupportSolver,
+        *,
+        convex: bool = True,
+        ahead: bool = True,
+    ) -> None:
         """Keep the gauge and its solver, which makes the table and solves what is hard.
 
         Args:
             gauge: Of the surface g = 1.
             solver: For its support points.
             convex: Whether a point with the wanted normal is the answer for that alone.
+            ahead: Whether a table is worth its time before any large batch is there.
         """
+        self._ahead = ahead
         self._gauge = gauge
         self._solver = solver
         self._convex = convex
@@ -58,5 +68,7 @@ class Tabulated(SupportSolver):
 
     def expect(self, count: float) -> None:
         """Make the table if it pays for so many normals at once."""
+        if count == inf and not self._ahead:
+            return
         if self._table is None and count >= (_PAYS_CONVEX if self._convex else _PAYS) * SAMPLES:
             self._table = SupportTable(self._gauge, self._solver, convex=self._convex)
