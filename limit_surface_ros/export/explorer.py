@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Surfaces as a page to play with: one drags a load or a push and sees what each model says."""
+
+from __future__ import annotations
+
+import html
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from limit_surface_ros.errors import DataError
+from limit_surface_ros.export.javascript import javascript_engine, javascript_numbers
+from limit_surface_ros.export.portable import portable
+from limit_surface_ros.export.texts import filled
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.files.surface_file import SurfaceModel
+
+# Models beside each other, each with a colour of its own.
+MOST_MODELS = 4
+# Vertices of the disc that stands for an outline that is not known.
+_DISC = 48
+# Fewest points of a contact whose hull is an outline.
+_HULL = 3
+
+
+def explorer_page(models: Sequence[SurfaceModel]) -> str:
+    """Return the text of the page, which needs no network.
+
+    Args:
+        models: One to four, about one point of one frame. The outline of the push is that of the
+            first: the hull of its support points, or else a disc of its characteristic length.
+
+    Raises:
+        DataError: There are none or more models, or the kind of one cannot be exported.
+    """
+    if not 1 <= len(models) <= MOST_MODELS:
+        raise DataError(f"the page holds 1 to {MOST_MODELS} models, got {len(models)}")
+    numbers = []
+    for model in models:
+        each = json.loads(javascript_numbers(portable(model.surface), model.name))
+        each["outline"] = outline_of(model).tolist()
+        numbers.append(each)
+    names = ", ".join(model.name for model in models)
+    return filled(
+        "explorer.html",
+        {
+            "TITLE": html.escape(f"Limit surface {names}"),
+            "ENGINE": javascript_engine(),
+            # Within a script, no text may look like its end.
+            "MODELS": json.dumps(numbers).replace("</", "<\\/"),
+        },
+    )
+
+
+def outline_of(model: SurfaceModel) -> Floats:
+    """Return an outline about the reference point, counter-clockwise, shape (n, 2) [m]."""
+    contact = model.surface.contact_points
+    if contact is not None:
+        from scipy.spatial import ConvexHull, QhullError
+
+        points = contact[0][contact[1] > 0.0]
+        if len(points) >= _HULL:
+            try:
+                return np.asarray(points[ConvexHull(points).vertices])
+            except QhullError:
+                # All on a line: no hull.
+                pass
+    angle = 2.0 * np.pi * np.arange(_DISC) / _DISC
+    rho = model.surface.scaling.characteristic_length
+    return np.asarray(1.5 * rho * np.array([np.cos(angle), np.sin(angle)]).T)

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The promise of `explore_surface`: a page of one file whose answers are those of the library."""
+
+import html
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from export_models import MODELS, SCALING, TRIANGLE
+from limit_surface_ros.export.explorer import explorer_page, outline_of
+from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
+from limit_surface_ros.motion.push import push
+from limit_surface_ros.surface import PointContacts
+from limit_surface_ros.tools.explore_surface import main
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+# Presses keys and moves sliders as somebody would, then writes down where everything stands.
+USE = """<pre id="seen"></pre><script type="module">
+const press = (id, key, times) => { for (let i = 0; i < times; ++i) document.getElementById(id)
+  .dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true })); };
+const slide = (id, value) => { const input = document.getElementById(id); input.value = value;
+  input.dispatchEvent(new Event("input")); };
+press("load-handle", "ArrowLeft", 10);
+press("load-handle", "ArrowDown", 30);
+slide("moment", 0.3);
+press("push-handle", "ArrowRight", 7);
+slide("direction", DIRECTION);
+slide("friction", FRICTION);
+const box = document.getElementById("push").getBoundingClientRect();
+document.getElementById("seen").textContent = [...document.querySelectorAll("#answers tr")]
+  .map((row) => [...row.children].map((cell) => cell.textContent).join("|"))
+  .concat(document.getElementById("load-handle").getAttribute("aria-valuetext"),
+          document.getElementById("push-handle").getAttribute("aria-valuetext"),
+          String(document.documentElement.scrollWidth <= innerWidth)).join("\\n");
+</script>"""
+
+
+def numbers(text):
+    """Return the numbers in a text."""
+    return [float(each) for each in re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?", text)]
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine; .ci/run installs it")
+@pytest.mark.parametrize(("direction", "friction"), [(0, 0.3), (70, 0.3), (-70, 0.3), (20, 1.5)])
+def test_a_page_that_is_used_shows_what_the_library_says(direction, friction, tmp_path):
+    surfaces = {"triangle": TRIANGLE, "norms": MODELS["norms_4"]}
+    models = [SurfaceModel(name, surface) for name, surface in surfaces.items()]
+    use = USE.replace("DIRECTION", str(direction)).replace("FRICTION", str(friction))
+    page = tmp_path / "page.html"
+    page.write_text(explorer_page(models).replace("</body>", use + "</body>"), encoding="utf-8")
+    profile = f"--user-data-dir={tmp_path / 'profile'}"
+    command = [CHROMIUM, *FLAGS, profile, "--window-size=360,800", "--virtual-time-budget=20000"]
+    dump = subprocess.run(
+        [*command, "--dump-dom", page.as_uri()], capture_output=True, text=True, check=True
+    ).stdout
+    seen = html.unescape(re.search(r'<pre id="seen">(.*?)</pre>', dump, re.DOTALL)[1])
+    *rows, load, place, fits = seen.split("\n")
+    assert fits == "true"
+    force = numbers(load)
+    point = np.array(numbers(place))
+    moment = 0.3 * max(s.wrench_of_twist([0.0, 0.0, 1.0])[2] for s in surfaces.values())
+    # The place is on an edge: its inward normal is that edge's.
+    corners = outline_of(models[0])
+    ends = np.roll(corners, -1, axis=0)
+    edges = ends - corners
+    away = np.abs(np.cross(edges, point - corners)) / np.linalg.norm(edges, axis=1)
+    tangent = edges[away.argmin()] / np.linalg.norm(edges[away.argmin()])
+    normal = np.array([-tangent[1], tangent[0]])
+    angle = np.radians(direction)
+    velocity = np.cos(angle) * normal - np.sin(angle) * tangent
+    for row, (name, surface) in zip(rows, surfaces.items(), strict=True):
+        shown, factor, twist, _, mode, pushed = row.split("|")
+        assert shown == name
+        wrench = [*force, moment]
+        assert numbers(factor)[0] == pytest.approx(surface.load_factor(wrench), rel=0.02)
+        assert ("slides" in factor) == (numbers(factor)[0] >= 1.0)
+        right = surface.twist_of_wrench(wrench) / SCALING.twist_unit
+        assert numbers(twist) / SCALING.twist_unit == pytest.approx(right, abs=0.05)
+        expected = push(surface, point, normal, friction, velocity)
+        assert mode == {"stick": "sticks"}.get(expected.mode, expected.mode.replace("slide_", "slides "))
+        found = np.array(numbers(pushed)) / SCALING.twist_unit
+        assert found == pytest.approx(expected.twist / SCALING.twist_unit, abs=0.05)
+
+
+def test_the_page_needs_no_network_and_holds_names_as_text(tmp_path):
+    text = explorer_page([SurfaceModel("</script><b>box & co", TRIANGLE)])
+    assert not re.search(r"(?:src|href)=|@import|url\(|fetch\(", text)
+    assert "</script><b>" not in text
+    assert "&lt;b&gt;box &amp; co" in text
+
+
+def test_an_outline_is_the_hull_of_support_points_or_a_disc():
+    assert len(outline_of(SurfaceModel("triangle", TRIANGLE))) == 3
+    line = PointContacts([[0.0, 0.0], [0.1, 0.0], [0.2, 0.0]], [1.0] * 3, SCALING)
+    assert len(outline_of(SurfaceModel("line", line))) == 48
+    assert len(outline_of(SurfaceModel("norms", MODELS["norms_4"]))) == 48
+
+
+def test_the_program_writes_the_page_and_refuses_what_it_cannot_show(tmp_path, capsys):
+    paths = []
+    for name in "abcde":
+        paths.append(tmp_path / f"{name}.yaml")
+        write_surface_model(SurfaceModel(name, TRIANGLE), paths[-1])
+    page = tmp_path / "page.html"
+    assert main([*map(str, paths[:2]), "-o", str(page)]) == 0
+    assert page.read_text(encoding="utf-8").startswith("<!doctype html>")
+    assert main([*map(str, paths), "-o", str(page)]) == 2
+    assert "1 to 4" in capsys.readouterr().err
+    assert main([str(paths[0]), str(paths[0]), "-o", str(page)]) == 2
+    assert "two files" in capsys.readouterr().err
+    write_surface_model(SurfaceModel("else", TRIANGLE, frame_id="other"), paths[1])
+    assert main([str(paths[0]), str(paths[1]), "-o", str(page)]) == 2
