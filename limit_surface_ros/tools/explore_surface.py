@@ -63,7 +63,9 @@ def run(options: argparse.Namespace) -> None:
     names = [model.name for model in models]
     for name in names:
         if names.count(name) > 1:
-            raise DataError(f"two files hold a model named {name!r}: the page could not tell them apart")
+            raise DataError(
+                f"two files hold a model named {name!r}: the page could not tell them apart"
+            )
     require_one_point(
         [
             About(path, model.frame_id, model.reference_point)

@@ -76,7 +76,9 @@ def test_a_page_that_is_used_shows_what_the_library_says(direction, friction, tm
     corners = outline_of(models[0])
     ends = np.roll(corners, -1, axis=0)
     edges = ends - corners
-    away = np.abs(np.cross(edges, point - corners)) / np.linalg.norm(edges, axis=1)
+    to_point = point - corners
+    away = np.abs(edges[:, 0] * to_point[:, 1] - edges[:, 1] * to_point[:, 0])
+    away /= np.linalg.norm(edges, axis=1)
     tangent = edges[away.argmin()] / np.linalg.norm(edges[away.argmin()])
     normal = np.array([-tangent[1], tangent[0]])
     angle = np.radians(direction)
@@ -90,7 +92,9 @@ def test_a_page_that_is_used_shows_what_the_library_says(direction, friction, tm
         right = surface.twist_of_wrench(wrench) / SCALING.twist_unit
         assert numbers(twist) / SCALING.twist_unit == pytest.approx(right, abs=0.05)
         expected = push(surface, point, normal, friction, velocity)
-        assert mode == {"stick": "sticks"}.get(expected.mode, expected.mode.replace("slide_", "slides "))
+        assert mode == {"stick": "sticks"}.get(
+            expected.mode, expected.mode.replace("slide_", "slides ")
+        )
         found = np.array(numbers(pushed)) / SCALING.twist_unit
         assert found == pytest.approx(expected.twist / SCALING.twist_unit, abs=0.05)
 
