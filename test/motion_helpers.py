@@ -22,6 +22,7 @@ class Disc:
     """
 
     kind = "disc"
+    contact_points = scaled_forms = None
 
     def __init__(self, radius, friction, hole=0.0):
         self.radius, self.friction, self.hole = radius, friction, hole

@@ -90,6 +90,16 @@ class NormFriction:
         roots = np.array([_triangle(root_of(form)) for form in forms]) * unit
         return cls(_merged(roots))
 
+    @classmethod
+    def of_points(cls, points: Floats, limits: Floats) -> NormFriction:
+        """Return the friction of support points, shape (n, 2), with their limits [N], (n,)."""
+        points, limits = points[limits > 0.0], limits[limits > 0.0]
+        roots = np.zeros((len(points), 3, 3))
+        roots[:, 0, 0] = roots[:, 1, 1] = limits
+        roots[:, 0, 2] = -limits * points[:, 1]
+        roots[:, 1, 2] = limits * points[:, 0]
+        return cls(_merged(roots))
+
     def without(self, terms: Sequence[int]) -> NormFriction:
         """Return the friction of all terms but some."""
         return NormFriction(np.delete(self.roots, list(terms), axis=0))
@@ -229,7 +239,9 @@ class MapFriction:
 
 def friction_of(surface: LimitSurface) -> NormFriction | MapFriction:
     """Return the friction of a surface, in closed form where its dissipation is a sum of norms."""
-    forms = getattr(surface, "scaled_forms", None)
+    if surface.contact_points is not None:
+        return NormFriction.of_points(*surface.contact_points)
+    forms = surface.scaled_forms
     if forms is None:
         return MapFriction(surface)
     scaling = surface.scaling

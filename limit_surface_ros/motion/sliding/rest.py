@@ -36,7 +36,8 @@ LIMIT_TOLERANCE = 1e-9
 
 def null_space(rows: Floats) -> Floats:
     """Return an orthonormal basis of the twists that rows (n, 3) map to zero, shape (3, d)."""
-    _, sizes, vectors = np.linalg.svd(rows)
+    # Of a triangle: the left vectors of many rows would be a huge matrix.
+    _, sizes, vectors = np.linalg.svd(np.linalg.qr(rows, mode="r"))
     rank = int((sizes > 1e-12 * sizes[0]).sum())
     return np.asarray(vectors[rank:].T)
 
