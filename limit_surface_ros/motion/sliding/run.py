@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 # Part of a leg's greatest energy norm below which it ends along its last direction, and where a
 # load is about to reverse it.
 _END, _REVERSED = 1e-5, 1e-9
+# Part of the time that may hang on how its direction still turns, and by how much slower a body
+# is looked at next.
+_SETTLED, _NEXT = 3e-8, 0.5
 # Part of the net force that may change meanwhile.
 _STEADY = 1e-3
 # Part of the slide's greatest energy norm with which a body leaves rest, and of the load's
@@ -201,7 +204,7 @@ class Run:
 
     def _slide_to_rest(self, state: State) -> tuple[State, Floats]:
         """Return the state at the next rest, and the direction in which it was reached."""
-        peak = 0.0
+        peak, below = 0.0, _END
         held: tuple[int, ...] = ()
         creases = self._creases
         while True:
@@ -225,7 +228,8 @@ class Run:
                 self._path.add(state, motion.acceleration(stepper.y, stepper.slope))
                 speed = self._body.energy_norm(state.twist)
                 peak = max(peak, speed)
-                if speed < _END * peak:
+                if speed < below * peak:
+                    below *= _NEXT
                     end = self._at_rest(state, speed, speed < _REVERSED * peak, held)
                     if end is not None:
                         self._evaluations += stepper.evaluations
@@ -287,6 +291,9 @@ class Run:
                 return None
         self._check(rest.time)
         g = n if held else final_direction(self._friction, self._matrix, wrench, n)
+        turned = float((self._friction.wrenches(g[np.newaxis])[0] - wrench) @ g)
+        if not last and abs(turned - slowing) * span > _SETTLED * slowing * rest.time:
+            return None
         ax, ay, turning = (-slowing * n).tolist()
         self._path.arrive(rest, (c * ax - s * ay, s * ax + c * ay, turning))
         return rest, g
