@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 ORDERS = (2, 3, 4)
 # Turns the median of absolute values into a standard deviation, for normal noise.
 _DEVIATION_OF_MEDIAN = 1.4826
+# Values that change no more often than that are held, and not rounded.
+_FEWEST_STEPS = 10
 
 
 def estimate_noise(times: ArrayLike, values: ArrayLike) -> float:
@@ -82,6 +84,8 @@ def _rounding_noise(values: Floats) -> float:
     two levels that many values share, and others that none do.
     """
     distinct, counts = np.unique(values, return_counts=True)
+    if np.count_nonzero(np.diff(values)) < _FEWEST_STEPS:
+        return 0.0
     if len(distinct) < 2 or 2 * len(distinct) >= len(values) or np.median(counts) < 2:
         return 0.0
     return float(np.diff(distinct).min()) / math.sqrt(12.0)

@@ -36,6 +36,8 @@ def test_rounded_values_have_the_noise_of_rounding():
     times = np.linspace(0.0, 1.0, 2000)
     values = np.round(0.05 * times, 3)
     assert estimate_noise(times, values) == pytest.approx(1e-3 / np.sqrt(12.0), rel=1e-6)
+    held = np.where(times < 0.3, 0.01, 1.0)
+    assert estimate_noise(times, held) < 1e-14
     assert estimate_noise(times, np.full(2000, 3.0)) < 1e-14
 
 

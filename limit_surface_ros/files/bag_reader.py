@@ -1,146 +1,170 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Topics of recorded ROS 2 bags (sqlite3 and mcap), as times and numbers.
+"""Recorded bags of ROS 2 (sqlite3, MCAP, also compressed by zstd) and ROS 1, opened and listed.
 
-Bags are read by rosbags (extra `bags`), without ROS. A message with a header counts at the
-header's stamp, another at the time when it was recorded.
+Bags are read by rosbags (extra `bags`), without ROS. Whatever fails in it, or in what it reads by,
+becomes an error of this package that names the remedy.
 """
 
 from __future__ import annotations
 
-import dataclasses
-from dataclasses import dataclass
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from limit_surface_ros.errors import FileError, MissingExtraError
+from limit_surface_ros.errors import FileError, LimitSurfaceError, MissingExtraError
+from limit_surface_ros.files.regular_file import check_regular
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Collection, Iterator
 
-    from limit_surface_ros.checks import Floats
-
-ACCEPTED = "the folder of a ROS 2 bag, or an .mcap or .db3 file"
-WRENCH_FIELDS = tuple(
-    f"wrench.{part}.{axis}" for part in ("force", "torque") for axis in ("x", "y", "z")
-)
-TWIST_FIELDS = tuple(
-    f"twist.{part}.{axis}" for part in ("linear", "angular") for axis in ("x", "y", "z")
-)
+ACCEPTED = "the folder of a ROS 2 bag, or an .mcap, .db3 or .bag file"
+BAG_SUFFIXES = (".mcap", ".db3", ".bag")
+_STORED = (*BAG_SUFFIXES, ".zstd", ".yaml")
+_LONGEST_REASON = 200
 
 
-@dataclass(frozen=True, eq=False)
-class TopicRecord:
-    """What a bag holds of a topic.
+class Bag:
+    """An open bag.
 
     Attributes:
-        message_type: Such as "geometry_msgs/msg/WrenchStamped".
-        frame_id: Of the first message's header; empty without one.
-        times: Shape (n,), in order [s]; since the epoch, or since the simulation's start.
-        values: Shape (n, k), one column for each field asked for.
+        path: Its folder or file.
+        types: The message type of each topic, by its name.
     """
 
-    message_type: str
-    frame_id: str
-    times: Floats
-    values: Floats
+    def __init__(self, path: Path, reader: Any) -> None:
+        """Take an open reader of rosbags."""
+        self.path = path
+        self._reader = reader
+        self.types: dict[str, str] = {
+            str(connection.topic): str(connection.msgtype) for connection in reader.connections
+        }
+
+    def type_of(self, topic: str, accepted: Collection[str], what: str) -> tuple[str, str]:
+        """Return the full name of a topic and its type.
+
+        Args:
+            topic: With or without the slash at its front.
+            accepted: The types that are taken; any if there are none.
+            what: The topic is of, as "wrenches", for the error.
+
+        Raises:
+            FileError: There is no such topic, or it is of another type; the message lists what
+                there is and what is taken.
+        """
+        name = f"/{topic.lstrip('/')}"
+        name = topic if topic in self.types and name not in self.types else name
+        if name not in self.types:
+            fit = [key for key, kind in self.types.items() if kind in accepted]
+            told = f"; of {what} there are {_listed(fit)}" if accepted else ""
+            raise FileError(
+                f"{self.path}: has no topic {name}; there are {_listed(self.types)}{told}"
+            )
+        kind = self.types[name]
+        if accepted and kind not in accepted:
+            raise FileError(
+                f"{self.path}: topic {name} is of type {kind}; {what} are read of "
+                f"{', '.join(accepted)}; there are "
+                f"{_listed(f'{key} ({kind})' for key, kind in self.types.items())}"
+            )
+        return name, kind
+
+    def messages(self, topic: str) -> Iterator[tuple[Any, int]]:
+        """Yield the messages of a topic that is there, and when each was recorded [ns].
+
+        Raises:
+            FileError: A message cannot be read.
+        """
+        with errors_of_bag(self.path):
+            found = [entry for entry in self._reader.connections if entry.topic == topic]
+            for entry, stamp, raw in self._reader.messages(connections=found):
+                yield self._reader.deserialize(raw, entry.msgtype), int(stamp)
 
 
-def read_topic(path: str | Path, topic: str, fields: Sequence[str] | None = None) -> TopicRecord:
-    """Read fields of a topic's messages.
+@contextmanager
+def open_bag(path: str | Path) -> Iterator[Bag]:
+    """Open a bag inside the block.
 
     Args:
-        path: The bag: its folder, or an .mcap file.
-        topic: Name of the topic, with or without the slash at its front.
-        fields: Dotted names of numbers in the message, such as "wrench.force.x". If not given,
-            the message must hold one number.
+        path: Its folder, or a file of it.
 
     Raises:
         MissingExtraError: rosbags is not installed.
-        FileError: The bag cannot be read, has not that topic or no message on it, or the message
-            has not such a field; the message lists what there is.
+        FileError: It cannot be read as a bag.
     """
     try:
-        from rosbags.highlevel import AnyReader, AnyReaderError
+        from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise MissingExtraError("rosbags", "bags") from None
     path = Path(path)
+    _check(path)
+    with errors_of_bag(path):
+        reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_JAZZY))
+        reader.open()
+        try:
+            bag = Bag(path, reader)
+            yield bag
+        finally:
+            reader.close()
+
+
+def _check(path: Path) -> None:
+    """Refuse what is no bag by its name, and what only seems to be a file."""
     if not path.exists():
         raise FileError(f"{path}: no such bag")
-    if path.is_dir() and not (path / "metadata.yaml").is_file():
-        raise FileError(
-            f"{path}: cannot be read as a bag: the folder has no metadata.yaml; "
-            f"accepted are {ACCEPTED}"
-        )
-    name = f"/{topic.lstrip('/')}"
+    if not path.is_dir():
+        check_regular(path)
+        if path.suffix.lower() not in BAG_SUFFIXES:
+            packed = "; unpack it, or give its folder" if path.suffix == ".zstd" else ""
+            raise FileError(f"{path}: cannot be read as a bag; accepted are {ACCEPTED}{packed}")
+        return
     try:
-        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
-            found = [entry for entry in reader.connections if entry.topic == name]
-            if not found:
-                topics = ", ".join(sorted({entry.topic for entry in reader.connections}))
-                raise FileError(f"{path}: has no topic {name}; there are {topics or 'none'}")
-            messages = [
-                (reader.deserialize(raw, entry.msgtype), stamp)
-                for entry, stamp, raw in reader.messages(connections=found)
-            ]
-    except (AnyReaderError, OSError, KeyError) as error:
-        reason = str(error).splitlines()[0]
+        for entry in path.iterdir():
+            if entry.suffix.lower() in _STORED:
+                check_regular(entry)
+        known = (path / "metadata.yaml").is_file()
+        stored = sorted(e.name for e in path.iterdir() if e.suffix.lower() in BAG_SUFFIXES)
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read: {error.strerror or error}") from None
+    if not known:
+        remedy = f"accepted are {ACCEPTED}"
+        if stored:
+            remedy = f"`ros2 bag reindex {path}` writes it, or give the file {stored[0]} itself"
         raise FileError(
-            f"{path}: cannot be read as a bag: {reason}; accepted are {ACCEPTED}"
+            f"{path}: cannot be read as a bag: the folder has no metadata.yaml; {remedy}"
+        )
+
+
+@contextmanager
+def errors_of_bag(path: Path) -> Iterator[None]:
+    """Turn whatever reading a bag raises inside the block into a FileError with the remedy."""
+    try:
+        yield
+    except (LimitSurfaceError, GeneratorExit):
+        raise
+    # A damaged bag fails anywhere: in YAML, SQLite, decompression, CDR, or for want of memory.
+    except Exception as error:
+        text = " ".join(str(error).split()) or "no reason is given"
+        reason = f"{type(error).__name__}: {text[:_LONGEST_REASON]}"
+        raise FileError(
+            f"{path}: cannot be read as a bag: {reason}; accepted are {ACCEPTED}. {_remedy(path)}"
         ) from None
-    if not messages:
-        raise FileError(f"{path}: has no message on {name}")
-    first = messages[0][0]
-    chosen = _check_fields(path, name, first, fields)
-    times = np.array([_time(message, stamp) for message, stamp in messages])
-    values = np.array([[_number(message, field) for field in chosen] for message, _ in messages])
-    order = np.argsort(times, kind="stable")
-    header = getattr(first, "header", None)
-    frame_id = "" if header is None else str(header.frame_id)
-    return TopicRecord(found[0].msgtype, frame_id, times[order], values[order])
 
 
-def _check_fields(
-    path: Path, topic: str, message: Any, fields: Sequence[str] | None
-) -> Sequence[str]:
-    """Return the fields asked for, or the only one there is."""
-    known = [name for name in _number_fields(message) if not name.startswith("header.")]
-    if fields is None:
-        if len(known) != 1:
-            raise FileError(
-                f"{path}: messages on {topic} hold {len(known)} numbers; name one: "
-                f"{', '.join(known)}"
-            )
-        return known
-    for field in fields:
-        if field not in known:
-            raise FileError(
-                f"{path}: messages on {topic} have no number {field!r}; there are "
-                f"{', '.join(known)}"
-            )
-    return fields
+def _remedy(path: Path) -> str:
+    if path.suffix.lower() == ".bag":
+        return f"If it was cut while it was recorded: `rosbag reindex {path.name}`"
+    if path.is_dir():
+        return (
+            f"If it was cut while it was recorded: `ros2 bag reindex {path.name}`, or give the "
+            ".mcap or .db3 file in it"
+        )
+    if path.suffix.lower() == ".mcap":
+        return f"If it was cut while it was recorded: `mcap recover {path.name} -o whole.mcap`"
+    return (
+        f"If it was cut while it was recorded: `sqlite3 {path.name} .recover | sqlite3 whole.db3`"
+    )
 
 
-def _number_fields(message: Any, prefix: str = "") -> Iterator[str]:
-    """Yield the dotted names of all numbers in a message, those in arrays left out."""
-    for entry in dataclasses.fields(message):
-        value = getattr(message, entry.name)
-        if dataclasses.is_dataclass(value):
-            yield from _number_fields(value, f"{prefix}{entry.name}.")
-        elif isinstance(value, (int, float)) and type(value) is not bool:
-            yield f"{prefix}{entry.name}"
-
-
-def _number(message: Any, field: str) -> float:
-    for part in field.split("."):
-        message = getattr(message, part)
-    return float(message)
-
-
-def _time(message: Any, stamp: int) -> float:
-    header = getattr(message, "header", None)
-    if header is None:
-        return stamp * 1e-9
-    return float(header.stamp.sec) + float(header.stamp.nanosec) * 1e-9
+def _listed(names: Collection[str] | Iterator[str]) -> str:
+    return ", ".join(sorted(names)) or "none"

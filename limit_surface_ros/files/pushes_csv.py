@@ -82,7 +82,7 @@ class Pushes:
                     f"{self.path}: there is no row {number}; rows are 0 to {len(self.pairs) - 1}"
                 )
         chosen = np.asarray(numbers, dtype=int)
-        return Pairs(self.pairs.wrenches[chosen], self.pairs.twists[chosen])
+        return self.pairs.take(chosen)
 
     def rest(self, numbers: Sequence[int]) -> Pairs:
         """Return the pairs of all other rows."""

@@ -121,7 +121,8 @@ def scale_pairs(pairs: Pairs, scaling: Scaling | None = None) -> ScaledPairs:
     directions = pairs.twists / scaling.twist_unit
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     wrenches = pairs.wrenches / scaling.wrench_unit
-    return ScaledPairs(_rounded(wrenches), np.round(directions, _DECIMALS), scaling)
+    rounded = np.round(directions, _DECIMALS)
+    return ScaledPairs(_rounded(wrenches), rounded, scaling, pairs.weights)
 
 
 def _rounded(wrenches: Floats) -> Floats:

@@ -14,7 +14,7 @@ from limit_surface_ros.decay.examples import EXAMPLES, example
 from limit_surface_ros.decay.noise import resting_level
 from limit_surface_ros.decay.targets import Record
 from limit_surface_ros.errors import DataError, FileError, RangeError
-from limit_surface_ros.files.bag_reader import read_topic
+from limit_surface_ros.files.bag_topic import read_topic
 from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
 from limit_surface_ros.tools.csv_options import add_response_options, response_of_csv
 from limit_surface_ros.tools.training_data import is_bag

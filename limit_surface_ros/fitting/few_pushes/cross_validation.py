@@ -118,8 +118,8 @@ def choose_recipe(
     tasks = []
     for part in parts:
         seen = np.setdiff1d(np.arange(count), part)
-        training = Pairs(pairs.wrenches[seen], pairs.twists[seen])
-        held_out = Pairs(pairs.wrenches[part], pairs.twists[part])
+        training = pairs.take(seen)
+        held_out = pairs.take(part)
         tasks.append((FitContext(training, scaling, support, seed=seed), held_out, recipes))
     if executor is None:
         found = (_angles(*task) for task in tasks)
