@@ -3,11 +3,10 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from limit_surface_ros.errors import RangeError
-from limit_surface_ros.files.bag_pushes import Selection
+from limit_surface_ros.tools.bag_options import OF_BAGS
 from limit_surface_ros.tools.csv_options import OF_CELLS
 from limit_surface_ros.tools.options import refuse_unused
 from limit_surface_ros.tools.surface_fit import EXACT, kind_of, objective_of
@@ -21,7 +20,7 @@ OF_CONTACTS = ("motions", "facet_loads", "load_noise", "motion_noise")
 OF_INPUTS = {
     BODY: ("link", "friction_coefficient", "normal_force"),
     PUSHES: ("rows", *OF_CELLS),
-    BAG: ("wrench_topic", "motion_topic", *asdict(Selection())),
+    BAG: OF_BAGS,
 }
 CHOSEN_BY_AUTO = ("kind", "terms", "family", "objective", "velocity_weight", "starts")
 OF_AUTO = ("folds", "support", "bootstrap")

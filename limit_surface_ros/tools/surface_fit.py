@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import datetime
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +12,6 @@ import numpy as np
 from limit_surface_ros import __version__
 from limit_surface_ros.checks import counted
 from limit_surface_ros.errors import DataError, RangeError
-from limit_surface_ros.files.bag_pushes import Selection
 from limit_surface_ros.files.body_file import read_body
 from limit_surface_ros.files.contact_file import read_contact
 from limit_surface_ros.files.surface_file import LARGEST_SCALE, SurfaceModel
@@ -27,6 +26,7 @@ from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.second_approximation import fit_second_approximation
 from limit_surface_ros.surface.kinds.power_sum import thesis_exponents
 from limit_surface_ros.surface.scaling import Scaling
+from limit_surface_ros.tools.bag_options import add_bag_options
 from limit_surface_ros.tools.csv_options import add_cell_options, cell_options
 from limit_surface_ros.tools.options import check_ranges
 from limit_surface_ros.tools.training_data import (
@@ -104,7 +104,7 @@ class FittedModel:
 def add_fit_options(parser: argparse.ArgumentParser) -> None:
     """Declare every option on which the fitted model depends, but for its name."""
     _add_data_options(parser.add_argument_group("data"))
-    _add_bag_options(parser.add_argument_group("bags: what counts as a quasi-static push"))
+    add_bag_options(parser)
 
     fit = parser.add_argument_group("fit")
     fit.add_argument(
@@ -229,32 +229,6 @@ def _add_data_options(data: argparse._ArgumentGroup) -> None:
         )
 
 
-def _add_bag_options(bags: argparse._ArgumentGroup) -> None:
-    bags.add_argument("--wrench-topic", help="of WrenchStamped, in the body's frame")
-    bags.add_argument(
-        "--motion-topic",
-        help="of TwistStamped in the same frame, or of PoseStamped in a fixed frame",
-    )
-    helps = {
-        "max_gap": "s|a wrench counts between two motions no further apart",
-        "min_speed": "m/s|slower, the body may stick",
-        "max_speed": "m/s|faster, inertia may count",
-        "max_acceleration": "m/s^2|a larger change of speed is not quasi-static",
-        "min_force": "N|a smaller force does not push",
-        "window": "s|pushes are averaged over windows of this length",
-        "lever": "m|turns angular speed into speed",
-    }
-    for rule, default in asdict(Selection()).items():
-        unit, _, meaning = helps[rule].partition("|")
-        bags.add_argument(
-            f"--{rule.replace('_', '-')}",
-            type=float,
-            default=default,
-            metavar="X",
-            help=f"{meaning} [{unit}] (%(default)s)",
-        )
-
-
 def check_fit_options(options: argparse.Namespace) -> None:
     """Refuse numbers that no fit takes, before there is any work.
 
@@ -321,10 +295,7 @@ def read_input(path: Path, options: argparse.Namespace) -> TrainingData:
     """
     kind = check_input(path)
     if kind == BAG:
-        rules = {rule: getattr(options, rule) for rule in asdict(Selection())}
-        return training_data_of_bag(
-            path, options.wrench_topic, options.motion_topic, Selection(**rules)
-        )
+        return training_data_of_bag(path, options)
     if kind in (CONTACT, BODY):
         simulation = Simulation(
             options.motions,

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from limit_surface_ros.errors import DataError, FileError
-from limit_surface_ros.files.bag_pushes import Selection, read_bag_pushes
+from limit_surface_ros.files.bag_pushes import Selection
+from limit_surface_ros.files.bag_reader import BAG_SUFFIXES
 from limit_surface_ros.files.body_file import SUFFIXES as BODY_SUFFIXES
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.files.surface_file import LARGEST_SCALE
@@ -18,8 +19,10 @@ from limit_surface_ros.fitting.simulation import simulated_pairs
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.sampling import random_motions
 from limit_surface_ros.surface.scaling import Scaling
+from limit_surface_ros.tools.bag_options import about_pushes, pushes_of_bag
 
 if TYPE_CHECKING:
+    import argparse
     from collections.abc import Iterator, Mapping
 
     from limit_surface_ros.files.contact_file import ContactModel
@@ -33,10 +36,9 @@ BODY = "a URDF or SDF"
 SUFFIXES = (*YAML_SUFFIXES, ".csv", *BODY_SUFFIXES)
 # Other ends of names that tables in text have.
 TABLE_SUFFIXES = (".csv", ".tsv", ".txt", ".dat")
-BAG_SUFFIXES = (".mcap", ".db3")
 ACCEPTED = (
     "a contact file (.yaml, .yml), a robot description (.urdf, .sdf), recorded pushes (.csv), or "
-    "a ROS 2 bag"
+    "a bag of ROS 2 or ROS 1"
 )
 
 
@@ -152,30 +154,32 @@ def training_data_of_pushes(
     )
 
 
-def training_data_of_bag(
-    path: Path, wrench_topic: str | None, motion_topic: str | None, selection: Selection
-) -> TrainingData:
+def training_data_of_bag(path: Path, options: argparse.Namespace) -> TrainingData:
     """Read the quasi-static pushes of a bag.
 
+    Args:
+        path: The bag.
+        options: What `add_bag_options` declares.
+
     Raises:
-        DataError: A topic is not named.
+        DataError: A topic is not named, or the bag holds no push.
+        FileError: The bag cannot be read, or its frames do not fit.
     """
-    if wrench_topic is None or motion_topic is None:
-        raise DataError(f"{path}: is a bag: name --wrench-topic and --motion-topic")
-    pushes = read_bag_pushes(path, wrench_topic, motion_topic, selection)
+    pushes = pushes_of_bag(path, options)
     about = {
         "data": path.name,
-        "wrench_topic": wrench_topic,
-        "motion_topic": motion_topic,
-        "selection": asdict(selection),
-        "wrenches": pushes.samples,
-        "dropped": pushes.dropped,
+        "wrench_topic": options.wrench_topic,
+        "motion_topic": options.motion_topic,
+        "selection": {rule: getattr(options, rule) for rule in asdict(Selection())},
+        **about_pushes(pushes),
     }
-    return TrainingData(training=pushes.pairs, recorded=True, about=about)
+    return TrainingData(
+        training=pushes.pairs, frame_id=pushes.frame_id, recorded=True, about=about
+    )
 
 
 def is_bag(path: Path) -> bool:
-    """Tell whether a path is a ROS 2 bag: a folder, or a file of one of the storages."""
+    """Tell whether a path is a bag: a folder, or a file of one of the storages."""
     return path.is_dir() or path.suffix.lower() in BAG_SUFFIXES
 
 
@@ -263,7 +267,8 @@ def check_input(path: Path) -> str:
         raise FileError(f"{path}: cannot be read: {error.strerror or error}") from None
     suffix = path.suffix.lower()
     if path.is_dir():
-        if not is_bag_folder(path):
+        # What holds the files of a bag alone is told by its reader how to be one.
+        if not is_bag_folder(path) and not any(map(is_bag, path.iterdir())):
             raise FileError(
                 f"{path}: is a folder without a metadata.yaml, so no bag; accepted is {ACCEPTED}"
             )

@@ -3,68 +3,20 @@
 
 import numpy as np
 import pytest
+from bag_helpers import (
+    POSE,
+    TIMES,
+    TWIST,
+    StoragePlugin,
+    pose,
+    steady_push,
+    twist,
+    wrench,
+    write_bag,
+)
 
 from limit_surface_ros.errors import DataError, FileError, RangeError
 from limit_surface_ros.files.bag_pushes import Selection, read_bag_pushes
-
-pytest.importorskip("rosbags", reason="the extra 'bags' is not installed")
-
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
-
-STORE = get_typestore(Stores.ROS2_JAZZY)
-TYPES = STORE.types
-WRENCH, TWIST, POSE = (f"geometry_msgs/msg/{name}Stamped" for name in ("Wrench", "Twist", "Pose"))
-
-
-def header(time, frame):
-    stamp = TYPES["builtin_interfaces/msg/Time"](sec=int(time), nanosec=round(time % 1 * 1e9))
-    return TYPES["std_msgs/msg/Header"](stamp=stamp, frame_id=frame)
-
-
-def vector(x, y, z):
-    return TYPES["geometry_msgs/msg/Vector3"](x=x, y=y, z=z)
-
-
-def wrench(time, fx, fy, tau):
-    load = TYPES["geometry_msgs/msg/Wrench"](force=vector(fx, fy, 9.0), torque=vector(9, 9, tau))
-    return TYPES[WRENCH](header=header(time, "object"), wrench=load)
-
-
-def twist(time, vx, vy, omega, frame="object"):
-    motion = TYPES["geometry_msgs/msg/Twist"](
-        linear=vector(vx, vy, 0.0), angular=vector(0.0, 0.0, omega)
-    )
-    return TYPES[TWIST](header=header(time, frame), twist=motion)
-
-
-def pose(time, x, y, yaw, frame="world"):
-    turn = TYPES["geometry_msgs/msg/Quaternion"](
-        x=0.0, y=0.0, z=float(np.sin(yaw / 2)), w=float(np.cos(yaw / 2))
-    )
-    place = TYPES["geometry_msgs/msg/Point"](x=x, y=y, z=0.0)
-    at = TYPES["geometry_msgs/msg/Pose"](position=place, orientation=turn)
-    return TYPES[POSE](header=header(time, frame), pose=at)
-
-
-def write_bag(path, topics, storage=StoragePlugin.SQLITE3):
-    with Writer(path, version=9, storage_plugin=storage) as writer:
-        for topic, (kind, messages) in topics.items():
-            connection = writer.add_connection(topic, kind, typestore=STORE)
-            for message in messages:
-                stamp = message.header.stamp
-                time = stamp.sec * 10**9 + stamp.nanosec
-                writer.write(connection, time, STORE.serialize_cdr(message, kind))
-    return path
-
-
-TIMES = np.arange(100.0, 102.0, 0.01)
-
-
-def steady_push(times=TIMES):
-    wrenches = [wrench(t, 1.0, 0.5, 0.02) for t in times]
-    twists = [twist(t, 0.02, 0.01, 0.1) for t in times + 0.003]
-    return {"/load": (WRENCH, wrenches), "/motion": (TWIST, twists)}
 
 
 @pytest.mark.parametrize("storage", [StoragePlugin.SQLITE3, StoragePlugin.MCAP])

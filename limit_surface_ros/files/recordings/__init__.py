@@ -6,4 +6,5 @@
 - `windows`: the parts of a run over which twist and wrench are averaged
 - `clocks`: how late the stamps of the wrenches are; `tare`: the sensor's bias from rests
 - `pushes`: all of it, from a recording to pairs with weights
+- `simulation`: recordings of a body that is known
 """

@@ -26,6 +26,8 @@ _INDEPENDENT, _DEVIATIONS, _PARTS = 0.5, 3.0, 3
 _LEAST_MOTION, _FEWEST = 3.0, 60
 # Directions are no better known than this [rad]: the body is no such function exactly.
 _SCATTER, _DEGREE = 0.02, 5
+# What is left of loads that are explained to the last digit.
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,8 @@ def find_delay(
         high = np.minimum(high, len(wrench_times))
         low = np.minimum(low, high - 1)
         loads = weights * (totals[high] - totals[low]) / (high - low)[:, None]
-        return float(np.sum(loads**2) - np.sum((basis.T @ loads) ** 2))
+        power = float(np.sum(loads**2))
+        return max(power - float(np.sum((basis.T @ loads) ** 2)), _ROUNDING * power)
 
     most = round(LARGEST_DELAY / _STEP)
     delays = _STEP * np.arange(-most, most + 1)
