@@ -30,6 +30,7 @@ PROGRAMS: dict[str, str] = {
     "plot_decay": "limit_surface_ros.tools.plot_decay",
     "plot_surface": "limit_surface_ros.tools.plot_surface",
     "reproduce_thesis": "limit_surface_ros.tools.reproduce_thesis",
+    "ask": "limit_surface_ros.nodes.ask",
     "demo": "limit_surface_ros.nodes.demo",
     "limit_surface_node": "limit_surface_ros.nodes.limit_surface_node",
     "decay_node": "limit_surface_ros.nodes.decay_node",

@@ -8,37 +8,23 @@ cannot be run in a test is checked as far as it can be: launch files and rviz co
 
 from __future__ import annotations
 
-import importlib
 import os
 import re
 import sys
 import threading
 from pathlib import Path
 
+from limit_surface_ros.nodes.plain_messages import fill, type_of
+
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "docs")]
 WAIT = 300.0
 
 
-def fill(message, values):
-    """Set the fields of a message from YAML, as ros2cli does; an unknown field is an error."""
-    fields = message.get_fields_and_field_types()
-    for name, value in values.items():
-        if name not in fields:
-            sys.exit(f"{type(message).__name__} has no field {name}; it has {', '.join(fields)}")
-        if isinstance(value, dict):
-            fill(getattr(message, name), value)
-        elif fields[name] in ("double", "float"):
-            setattr(message, name, float(value))
-        else:
-            setattr(message, name, value)
+def filled(message, text):
+    """Return a message whose fields are set from YAML, as ros2cli does."""
+    fill(message, read(text))
     return message
-
-
-def type_of(name):
-    """Return the class of a name such as geometry_msgs/msg/Wrench."""
-    package, kind, item = name.split("/")
-    return getattr(importlib.import_module(f"{package}.{kind}"), item)
 
 
 def read(text):
@@ -92,7 +78,7 @@ def call_service(name, kind, text="{}"):
         if not client.wait_for_service(timeout_sec=WAIT):
             sys.exit(f"no service {name} of type {kind}")
         answered = threading.Event()
-        future = client.call_async(fill(service.Request(), read(text)))
+        future = client.call_async(filled(service.Request(), text))
         future.add_done_callback(lambda _: answered.set())
         if not answered.wait(WAIT):
             sys.exit(f"service {name} did not answer")
@@ -102,7 +88,7 @@ def call_service(name, kind, text="{}"):
 def publish(once, name, kind, text="{}"):
     """`ros2 topic pub --once`: wait for somebody who listens, publish."""
     assert once == "--once", once
-    message = fill(type_of(kind)(), read(text))
+    message = filled(type_of(kind)(), text)
     with Peer() as node:
         publisher = node.create_publisher(type(message), name, 1)
         looked = threading.Event()

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The program `ask` says what a node answers, where there is no `ros2`."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+import yaml
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
+
+from limit_surface_ros.nodes.ask import main
+from limit_surface_ros.nodes.decay_node import DecayNode
+from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
+from process_helpers import WAIT
+
+
+@pytest.fixture
+def ask(capsys):
+    """Return a function that asks, and returns exit code, answers and what was told."""
+
+    def call(*arguments):
+        code = main([*arguments, "--wait", str(WAIT)])
+        printed = capsys.readouterr()
+        return code, printed.out, printed.err
+
+    return call
+
+
+@pytest.fixture
+def box(ros, model_file):
+    model, path = model_file("box", seed=1)
+    node = ros.add(LimitSurfaceNode, files=[path])
+    return model, node
+
+
+def planar(mapping, first, second):
+    return [mapping[first]["x"], mapping[first]["y"], mapping[second]["z"]]
+
+
+def test_a_load_is_asked_for_with_options(box, ask):
+    surface = box[0].surface
+    code, answer, told = ask("wrench_to_twist", "--force", "3", "0", "--torque", "0.1")
+    assert (code, told) == (0, "")
+    given = yaml.safe_load(answer)
+    twist = planar(given["twist"]["twist"], "linear", "angular")
+    np.testing.assert_allclose(twist, surface.twist_of_wrench([3.0, 0.0, 0.1]), rtol=1e-6)
+    assert given["load_factor"] == pytest.approx(surface.load_factor([3.0, 0.0, 0.1]), rel=1e-6)
+
+
+def test_fields_may_be_given_in_yaml_as_to_ros2(box, ask):
+    fields = "{twist: {header: {frame_id: object}, twist: {linear: {x: 1}, angular: {z: 0.5}}}}"
+    code, answer, _ = ask("/limit_surface/twist_to_wrench", fields)
+    assert code == 0
+    wrench = planar(yaml.safe_load(answer)["wrench"]["wrench"], "force", "torque")
+    np.testing.assert_allclose(wrench, box[0].surface.wrench_of_twist([1.0, 0.0, 0.5]), rtol=1e-6)
+
+
+def test_what_a_node_refuses_is_told_by_its_code(box, ask):
+    code, answer, told = ask("wrench_to_twist", "--force", "0", "0")
+    assert code == 1
+    assert "error_code: 101" in answer
+    assert told.startswith("ask: refused: ZERO_VECTOR (101): ")
+    code, _, told = ask("wrench_to_twist", "--force", "1", "0", "--model", "sofa")
+    assert code == 1
+    assert "UNKNOWN_MODEL" in told
+
+
+def test_without_a_name_it_lists_what_can_be_asked(box, ask):
+    code, answer, _ = ask()
+    assert code == 0
+    assert "service  /limit_surface/wrench_to_twist" in answer
+    assert "topic    /limit_surface/wrench" in answer
+    assert "parameter" not in answer
+
+
+def test_a_topic_is_sent_to_and_listened_to(ros, box, ask):
+    outcome = []
+    sender = threading.Thread(
+        target=lambda: outcome.append(main(["predicted_twist", "--wait", str(WAIT)]))
+    )
+    sender.start()
+    ros.wait(lambda: box[1].count_subscribers("/limit_surface/predicted_twist"))
+    while sender.is_alive():
+        code, _, _ = ask("limit_surface/wrench", "--send", "--force", "9", "0")
+        assert code == 0
+        sender.join(0.1)
+    assert outcome == [0]
+
+
+def test_a_name_that_two_nodes_have_must_be_told_apart(ros, box, ask, tmp_path):
+    ros.add(DecayNode)
+    ros.wait(lambda: box[1].get_service_names_and_types_by_node("decay", "/"))
+    code, _, told = ask("list_models")
+    assert code == 2
+    assert "/decay/list_models, /limit_surface/list_models" in told
+    code, answer, _ = ask("decay/list_models")
+    assert code == 0
+    assert "hockey_stick" in answer
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["wrench_to_twist", "--velocity", "1", "0"], "--velocity is not for this: its fields"),
+        (["wrench_to_twist", "--force", "1"], "--force takes x and y"),
+        (["wrench_to_twist", "{sofa: 1}"], "has no field sofa; it has model, wrench"),
+        (["wrench_to_twist", "{model: 1}"], "model must be of the type string, got 1"),
+        (["wrench_to_twist", "{wrench: 3}"], "fields are a mapping such as {header: ...}"),
+        (["reload", "{model: a}"], "has no field model; it has none"),
+        (["wrench_to_twist", "{"], "the fields are not YAML"),
+        (["wrench_to_twist", "7"], "fields are a mapping such as"),
+        (["wrench_to_twist", "--count", "0"], "--count must be at least 1"),
+    ],
+)
+def test_what_cannot_be_asked_is_told_in_one_line(box, ask, arguments, told):
+    code, answer, error = ask(*arguments)
+    assert (code, answer) == (2, "")
+    assert told in error
+
+
+def test_what_is_not_there_is_told_with_what_is(box, capsys):
+    assert main(["nothing", "--wait", "0.5"]) == 1
+    error = capsys.readouterr().err
+    assert "no service nothing after 0.5 s; there are" in error
