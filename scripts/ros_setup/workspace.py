@@ -2,6 +2,7 @@
 """The two packages of this repository, built by colcon when their sources changed."""
 
 import hashlib
+import os
 import shutil
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -68,6 +69,8 @@ def build(root: Path, python: Path, env: Mapping[str, str]) -> None:
         for place in ("install", "build"):
             shutil.rmtree(root / place / package.name, ignore_errors=True)
     names = [package.name for package in stale]
+    # Without a number of jobs colcon adds `-l`, and builds with one job on a busy machine.
+    jobs = f"-j{len(os.sched_getaffinity(0))}"
     run_logged(
         [
             *("colcon", "build", "--base-paths", *(package.folder for package in PACKAGES)),
@@ -78,7 +81,7 @@ def build(root: Path, python: Path, env: Mapping[str, str]) -> None:
         ],
         root / "log" / "set-up" / "build.log",
         f"building {' and '.join(names)}",
-        env,
+        {"MAKEFLAGS": jobs, **env},
         root,
     )
     for package in stale:
