@@ -28,6 +28,7 @@ PROGRAMS: dict[str, str] = {
     "fit_decay": "limit_surface_ros.tools.fit_decay",
     "compare_decays": "limit_surface_ros.tools.compare_decays",
     "plot_decay": "limit_surface_ros.tools.plot_decay",
+    "plot_push": "limit_surface_ros.tools.plot_push",
     "plot_surface": "limit_surface_ros.tools.plot_surface",
     "reproduce_thesis": "limit_surface_ros.tools.reproduce_thesis",
     "ask": "limit_surface_ros.nodes.ask",

@@ -10,9 +10,10 @@ import numpy as np
 
 from limit_surface_ros.checks import as_floats, as_positive
 from limit_surface_ros.errors import GeometryError, RangeError, ShapeError
+from limit_surface_ros.motion.inward_corner import Scene
 from limit_surface_ros.motion.outcomes import MODES, ContactMode
 from limit_surface_ros.motion.push_checks import as_vectors_of, friction_edges
-from limit_surface_ros.motion.rollout_steps import Rollout, Scene
+from limit_surface_ros.motion.rollout_steps import Rollout
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -16,16 +16,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from limit_surface_ros.errors import SolverError
+from limit_surface_ros.motion.inward_corner import TWO_PLACES, Scene, push_in_corner
+from limit_surface_ros.motion.outcomes import MODES
 from limit_surface_ros.motion.outline import Polygon
 from limit_surface_ros.motion.push_batch import Contacts, PushBatch, contact_velocities
 from limit_surface_ros.motion.push_checks import as_complex, as_vectors_of
 from limit_surface_ros.motion.push_roots import SEPARATE
-from limit_surface_ros.motion.several_contacts import TwoContacts
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Bools, Complexes, Floats, Places
-    from limit_surface_ros.motion.outline import Nearest, Outline
-    from limit_surface_ros.surface.base import LimitSurface
+    from limit_surface_ros.motion.outline import Nearest
 
 # Phases of a push: its tip is on its way, touches at one place, or at two, or has arrived.
 _FREE, _TOUCH, _CORNER, _DONE = range(4)
@@ -33,29 +33,9 @@ _FREE, _TOUCH, _CORNER, _DONE = range(4)
 _CAUTION, _SHORTEST, _LONGEST = 0.9, 0.2, 5.0
 # Beside kinks of an outline steps of so many tolerances are taken whatever their error.
 _LEAST_STEPS = 2.0
-# Gap, in tolerances, within which a tip counts as at two places of an outline bent inward.
-_TWO_PLACES = 10.0
 _MOST_ROUNDS = 100_000
 # A gap of this part of the outline's size is a touch.
 _TOUCHING = 1e-12
-
-
-class Scene(NamedTuple):
-    """What all pushes of a batch share.
-
-    Attributes:
-        surface: Of the body.
-        outline: In the body's frame.
-        reference_point: Of the surface in the body's frame [m].
-        edge: Unit force at the left edge of the friction cone, of which the normal is 1.
-        tolerance: Of the error of a step [m].
-    """
-
-    surface: LimitSurface
-    outline: Outline
-    reference_point: complex
-    edge: complex
-    tolerance: float
 
 
 class Steps(NamedTuple):
@@ -259,7 +239,7 @@ class Rollout:
             if len(stays):
                 tip, _, _ = self._ways(stays)
                 centre = as_vectors_of(_seen(self.poses[stays], tip)[1])
-                slack = _TWO_PLACES * self._scene.tolerance
+                slack = TWO_PLACES * self._scene.tolerance
                 counts = self._scene.outline.touch_counts(centre, self._radii[stays], slack)
                 phase = np.where(counts > 1, _CORNER, _TOUCH)
                 self._fresh[stays[phase != self._phase[stays]]] = True
@@ -279,7 +259,9 @@ class Rollout:
         if corner:
             for place in range(len(rows)):
                 radius = float(self._radii[rows[place]])
-                twists[place] = self._in_corner(centre[place], heading[place], radius)
+                twists[place] = push_in_corner(
+                    self._scene, centre[place], heading[place], radius
+                ).twist
                 closing[place] = 1.0 if twists[place].any() else closing[place]
         else:
             contacts, some = self._contacts(near, inward, heading, closing > 0.0)
@@ -308,35 +290,6 @@ class Rollout:
             return contacts, slice(None)
         some = np.flatnonzero(pushes)
         return contacts.take(some), some
-
-    def _in_corner(self, centre: complex, heading: complex, radius: float) -> Floats:
-        """Return the twist (3,) of a body whose outline is touched at two places, or one."""
-        scene = self._scene
-        assert isinstance(scene.outline, Polygon)
-        about = np.array([scene.reference_point.real, scene.reference_point.imag])
-        ahead = np.array([heading.real, heading.imag])
-        at = np.array([centre.real, centre.imag])
-        slack = 2.0 * _TWO_PLACES * scene.tolerance
-        touched = [
-            (foot - about, -normal)
-            for foot, normal in scene.outline.touched(at, radius, slack)
-            if normal @ ahead < 0.0
-        ]
-        if len(touched) < 2:
-            near = scene.outline.nearest(at[np.newaxis])
-            inward = -as_complex(near.normals)
-            pushes = (np.conj(inward) * heading).real > 0.0
-            contacts, _ = self._contacts(near, inward, np.array([heading]), pushes)
-            if not pushes[0]:
-                return np.zeros(3)
-            return np.asarray(self._batch.solve(contacts, wrenches=False).twists[0])
-        points, normals = (np.array([each[i] for each in touched[:2]]) for i in (0, 1))
-        edges = np.full(2, scene.edge)
-        twist = np.append(ahead, 0.0)
-        answer = next(TwoContacts(scene.surface, points, normals, edges, twist).answers(), None)
-        if answer is None:
-            raise SolverError("no motion was found of a body that is touched in an inward corner")
-        return answer.twist
 
     def _keep(self, rows: Places) -> None:
         if self._record is None:
@@ -373,6 +326,15 @@ class Rollout:
             found = self._batch.solve(contacts)
             assert found.wrenches is not None
             twists[some], modes[some], wrenches[some] = found.twists, found.modes, found.wrenches
+        if self._has_corners:
+            assert isinstance(self._scene.outline, Polygon)
+            slack = 2.0 * TWO_PLACES * self._scene.tolerance
+            radii = self._radii[steps.pushes]
+            counts = self._scene.outline.touch_counts(as_vectors_of(centre), radii, slack)
+            for row in np.flatnonzero((counts > 1) & pushes):
+                pushed = push_in_corner(self._scene, centre[row], heading[row], float(radii[row]))
+                twists[row], wrenches[row] = pushed.twist, pushed.wrench
+                modes[row] = MODES.index(pushed.mode)
         return twists, modes, wrenches, near.points
 
 

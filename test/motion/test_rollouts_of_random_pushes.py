@@ -183,6 +183,9 @@ def test_a_tip_stuck_in_an_inward_corner_carries_the_body_along():
     reach = 0.01 + TIP * np.hypot(0.05, 0.03) / 0.05
     assert run.touched_at == pytest.approx(0.03 - reach, abs=1e-9)
     assert metric(run.end_pose, [0.0, -0.02 - reach, 0.0], BUTTERFLY) < 1e-6
+    # In the corner it pushes straight, with both contacts.
+    assert run.modes[-1] is ContactMode.STICK
+    np.testing.assert_allclose(run.wrenches[-1], [0.0, -1.0, 0.0], atol=1e-4)
 
 
 def test_round_outlines_agree_with_polygons_of_many_edges():

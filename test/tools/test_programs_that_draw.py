@@ -6,9 +6,17 @@ import pytest
 
 from limit_surface_ros.files.decay_file import read_decay_model
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
+from limit_surface_ros.motion.outline import Polygon
 from limit_surface_ros.plots.decay_view import draw_decay
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
-from limit_surface_ros.tools import fit_decay, plot_decay, plot_surface, reproduce_thesis
+from limit_surface_ros.surface.scaling import Scaling
+from limit_surface_ros.tools import (
+    fit_decay,
+    plot_decay,
+    plot_push,
+    plot_surface,
+    reproduce_thesis,
+)
 
 pytest.importorskip("matplotlib", reason="matplotlib draws the pictures")
 
@@ -169,3 +177,55 @@ def test_help_gives_examples(program, capsys):
         program.main(["--help"])
     assert done.value.code == 0
     assert "examples:" in capsys.readouterr().out
+
+
+@pytest.fixture
+def pushed_file(tmp_path):
+    path = tmp_path / "box.yaml"
+    outline = Polygon([[-0.05, -0.03], [0.05, -0.03], [0.05, 0.03], [-0.05, 0.03]])
+    surface = PowerSum.norms([np.diag([1.0, 1.0, 2.0])], Scaling(0.05, 3.0))
+    write_surface_model(SurfaceModel("box", surface, outline=outline), path)
+    return path
+
+
+def test_plot_push_says_where_the_body_ends_and_draws_its_way(tmp_path, pushed_file, capsys):
+    picture, film = tmp_path / "push.png", tmp_path / "push.gif"
+    path = ["-0.1", "0.0", "-0.035", "0.0"]
+    arguments = [str(pushed_file), "--path", *path, "-o", str(picture), "--animate", str(film)]
+    assert plot_push.main([*arguments, "--seconds", "0.3"]) == 0
+    printed = capsys.readouterr().out
+    assert "touched     after 45.000 mm" in printed
+    assert "end         x 0.020000 m, y 0.000000 m, angle 0.0000 deg" in printed
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert film.read_bytes().startswith(b"GIF8")
+
+
+def test_plot_push_without_a_path_pushes_from_the_left(tmp_path, pushed_file, capsys):
+    assert plot_push.main([str(pushed_file), "-o", str(tmp_path / "push.svg")]) == 0
+    printed = capsys.readouterr().out
+    assert "touched     after" in printed
+    assert "modes       separate, s" in printed
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (["--path", "0", "0"], "two or more corners"),
+        (["--path", "0", "0", "1"], "two or more corners"),
+        (["--path", "0", "0", "1", "0"], "within"),
+        (["--friction", "-1"], "friction"),
+        (["--accuracy", "0"], "accuracy"),
+        (["--animate", "push.webm"], ".gif or .mp4"),
+        (["--seconds", "0"], "seconds"),
+    ],
+)
+def test_what_plot_push_cannot_draw_is_refused(tmp_path, pushed_file, capsys, changes, message):
+    arguments = [str(pushed_file), "-o", str(tmp_path / "push.png"), *changes]
+    assert plot_push.main(arguments) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "push.png").exists()
+
+
+def test_a_body_without_an_outline_is_not_pushed(tmp_path, surface_file, capsys):
+    assert plot_push.main([str(surface_file), "-o", str(tmp_path / "push.png")]) == 2
+    assert "no outline" in capsys.readouterr().err

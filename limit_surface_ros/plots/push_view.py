@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pushes along a path as pictures: outlines on the way, contact, modes, force; and as films."""
+
+from __future__ import annotations
+
+import io
+import shutil
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from limit_surface_ros.errors import FileError, MissingExtraError
+from limit_surface_ros.files.atomic_write import write_atomically
+from limit_surface_ros.motion.outcomes import ContactMode
+from limit_surface_ros.plots.canvas import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    SKY,
+    VERMILION,
+    new_figure,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.motion.outline import Outline
+    from limit_surface_ros.motion.rollout import PushRun
+
+FILMS = (".gif", ".mp4")
+# What stands for each mode, in every part of the picture.
+COLOURS = {
+    ContactMode.STICK: GREEN,
+    ContactMode.SLIDE_LEFT: BLUE,
+    ContactMode.SLIDE_RIGHT: VERMILION,
+    ContactMode.SEPARATE: GREY,
+}
+_WORDS = {
+    ContactMode.STICK: "sticks",
+    ContactMode.SLIDE_LEFT: "slides left",
+    ContactMode.SLIDE_RIGHT: "slides right",
+    ContactMode.SEPARATE: "does not push",
+}
+# Outlines drawn on the way, and pictures of a film to the second.
+_GHOSTS = 9
+_RATE = 20
+# Length of the largest force, in mean radii of the outline.
+_ARROW = 0.8
+
+
+def draw_push(run: PushRun, outline: Outline, tip_radius: float, title: str = "") -> Figure:
+    """Draw a push: the body's way on the left; its turn, modes and force over the path's length.
+
+    Args:
+        run: The push.
+        outline: Of the body.
+        tip_radius: Of the pusher [m].
+        title: What to write above.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+    """
+    with new_figure(8.0, 4.2) as figure:
+        grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1.0))
+        _draw_way(figure.add_subplot(grid[:, 0]), run, outline, tip_radius)
+        _draw_turn(figure.add_subplot(grid[0, 1]), run)
+        _draw_force(figure.add_subplot(grid[1, 1]), run)
+        figure.suptitle(title or "a push along a path")
+    return figure
+
+
+def _corners(outline: Outline, pose: Floats) -> Floats:
+    """Return an outline at a pose as a closed polygon (n, 2) [mm]."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    points = outline.drawn() @ np.array([[c, s], [-s, c]]) + pose[:2]
+    return 1e3 * np.concatenate([points, points[:1]])
+
+
+def _tip_at(run: PushRun, length: float) -> Floats:
+    return np.array([np.interp(length, run.path_lengths, each) for each in run.tips.T])
+
+
+def _forces(run: PushRun) -> Floats:
+    """Return the tip's forces on the body in the frame of the path, (k, 2) [N]."""
+    c, s = np.cos(run.poses[:, 2]), np.sin(run.poses[:, 2])
+    fx, fy = run.wrenches[:, :2].T
+    return np.stack([c * fx - s * fy, s * fx + c * fy], axis=1)
+
+
+def _draw_way(axes: Axes, run: PushRun, outline: Outline, tip_radius: float) -> None:
+    from matplotlib.patches import Circle
+
+    lengths = np.linspace(0.0, run.path_lengths[-1], _GHOSTS)
+    for place, (length, pose) in enumerate(zip(lengths, run.poses_at(lengths), strict=True)):
+        last = place == _GHOSTS - 1
+        x, y = _corners(outline, pose).T
+        faint = 0.2 + 0.6 * place / _GHOSTS
+        axes.plot(x, y, color=BLACK if last else SKY, alpha=1.0 if last else faint, linewidth=1.0)
+        centre = 1e3 * _tip_at(run, length)
+        radius = max(1e3 * tip_radius, 0.3)
+        axes.add_patch(Circle(tuple(centre), radius, color=ORANGE, alpha=faint, linewidth=0))
+    axes.plot(*(1e3 * run.tips.T), color=ORANGE, linewidth=0.8, linestyle="--", label="tip")
+    axes.plot(*(1e3 * run.poses[:, :2].T), color=BLACK, linewidth=0.8, label="body's origin")
+    modes = np.array([mode.value for mode in run.modes])
+    for mode, colour in COLOURS.items():
+        which = modes == mode.value
+        if which.any() and mode is not ContactMode.SEPARATE:
+            points = 1e3 * run.contacts[which]
+            axes.plot(*points.T, ".", color=colour, markersize=4, label=_WORDS[mode])
+    forces = _forces(run)
+    largest = np.hypot(*forces.T).max()
+    if largest > 0.0:
+        scale = 1e3 * _ARROW * outline.mean_radius / largest
+        shown = np.unique(np.searchsorted(run.path_lengths, lengths[:-1]))
+        shown = shown[np.hypot(*forces[shown].T) > 0.0]
+        for point, force in zip(1e3 * run.contacts[shown], forces[shown], strict=True):
+            axes.annotate(
+                "",
+                point + scale * force,
+                point,
+                arrowprops={"arrowstyle": "->", "color": GREY, "linewidth": 0.8},
+            )
+    axes.set_aspect("equal")
+    axes.set_xlabel("x [mm]")
+    axes.set_ylabel("y [mm]")
+    axes.legend(loc="best")
+
+
+def _shade_modes(axes: Axes, run: PushRun) -> None:
+    """Shade what the contact does over the path's length."""
+    lengths = 1e3 * run.path_lengths
+    for place, mode in enumerate(run.modes[:-1]):
+        if lengths[place + 1] > lengths[place]:
+            axes.axvspan(
+                lengths[place], lengths[place + 1], color=COLOURS[mode], alpha=0.15, linewidth=0
+            )
+    axes.set_xlim(0.0, lengths[-1])
+
+
+def _draw_turn(axes: Axes, run: PushRun) -> None:
+    _shade_modes(axes, run)
+    lengths = np.linspace(0.0, run.path_lengths[-1], 200)
+    axes.plot(1e3 * lengths, np.degrees(run.poses_at(lengths)[:, 2]), color=BLACK)
+    axes.set_ylabel("angle [deg]")
+
+
+def _draw_force(axes: Axes, run: PushRun) -> None:
+    _shade_modes(axes, run)
+    sizes = np.hypot(*run.wrenches[:, :2].T)
+    axes.plot(1e3 * run.path_lengths, sizes, color=BLACK, drawstyle="steps-post")
+    axes.set_ylim(0.0, None)
+    axes.set_ylabel("force [N]")
+    axes.set_xlabel("path of the tip [mm]")
+
+
+def write_film(
+    run: PushRun, outline: Outline, tip_radius: float, path: str | Path, seconds: float = 4.0
+) -> None:
+    """Write a push as a GIF or an MP4, in one step.
+
+    Args:
+        run: The push.
+        outline: Of the body.
+        tip_radius: Of the pusher [m].
+        path: The file; its suffix is one of `FILMS`.
+        seconds: How long the film is [s].
+
+    Raises:
+        FileError: The suffix is another, or the file cannot be written.
+        MissingExtraError: matplotlib is not installed, or for an MP4 ffmpeg.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in FILMS:
+        raise FileError(f"{path}: films end in {' or '.join(FILMS)}, got {path.suffix!r}")
+    with new_figure(5.0, 4.5) as figure:
+        try:
+            from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
+            from matplotlib.patches import Circle
+        except ImportError:
+            raise MissingExtraError("pillow", "plots") from None
+        if path.suffix.lower() == ".mp4" and not shutil.which("ffmpeg"):
+            raise FileError(f"{path}: an MP4 needs the program ffmpeg: install it, or take a .gif")
+        axes = figure.add_subplot()
+        count = max(2, round(_RATE * seconds))
+        lengths = np.linspace(0.0, run.path_lengths[-1], count)
+        poses = run.poses_at(lengths)
+        seen = np.concatenate([_corners(outline, pose) for pose in poses[:: max(1, count // 20)]])
+        room = 1e3 * tip_radius + 5.0
+        low = np.minimum(seen.min(axis=0), 1e3 * run.tips.min(axis=0)) - room
+        high = np.maximum(seen.max(axis=0), 1e3 * run.tips.max(axis=0)) + room
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+        axes.set(xlabel="x [mm]", ylabel="y [mm]")
+        axes.plot(*_corners(outline, run.poses[0]).T, color=SKY, linewidth=0.8)
+        axes.plot(*(1e3 * run.tips.T), color=ORANGE, linewidth=0.8, linestyle="--")
+        (body,) = axes.plot([], [], color=BLACK)
+        tip = Circle((0.0, 0.0), max(1e3 * tip_radius, 0.5), color=ORANGE)
+        axes.add_patch(tip)
+
+        def show(place: int) -> list[object]:
+            body.set_data(*_corners(outline, poses[place]).T)
+            tip.center = tuple(1e3 * _tip_at(run, lengths[place]))
+            after = np.searchsorted(run.path_lengths, lengths[place], side="right") - 1
+            mode = run.modes[int(np.clip(after, 0, len(run.modes) - 1))]
+            tip.set_color(COLOURS[mode])
+            axes.set_title(_WORDS[mode])
+            return [body, tip]
+
+        film = FuncAnimation(figure, show, frames=count, interval=1000.0 / _RATE)
+        with tempfile.TemporaryDirectory() as folder:
+            made = Path(folder) / f"film{path.suffix.lower()}"
+            is_gif = path.suffix.lower() == ".gif"
+            writer = PillowWriter(fps=_RATE) if is_gif else FFMpegWriter(fps=_RATE)
+            film.save(made, writer=writer, dpi=90)
+            write_atomically(path, io.BytesIO(made.read_bytes()).getvalue())

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Predict where a push along a path ends, and draw it."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from limit_surface_ros.errors import DataError, RangeError
+from limit_surface_ros.files.contact_file import read_contact
+from limit_surface_ros.files.surface_file import read_surface_model
+from limit_surface_ros.files.yaml_reader import read_yaml
+from limit_surface_ros.motion.rollout import DEFAULT_ACCURACY, OVERLAPS, simulate_push
+from limit_surface_ros.plots.canvas import save_figure
+from limit_surface_ros.plots.push_view import FILMS, draw_push, write_film
+from limit_surface_ros.tools.options import (
+    add_picture_options,
+    check_output,
+    check_picture,
+    check_ranges,
+)
+from limit_surface_ros.tools.program import run_program
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.motion.outline import Outline
+    from limit_surface_ros.surface.base import LimitSurface
+
+EPILOG = """\
+MODEL is a model file with the key `outline`, or a contact file whose shape has a rim. The path is
+that of the tip's centre, in the frame in which the body begins at --pose. Without --path the tip
+pushes the body from the left, a quarter of its height above its middle, over half its width.
+
+examples:
+  plot_push config/models/triangle_patch.yaml --output push.png
+  plot_push box.yaml --path -0.10 0.02 0.00 0.02 0.05 0.05 --friction 0.25 --tip-radius 0.005
+  plot_push box.yaml --animate push.gif
+"""
+
+
+class Body(NamedTuple):
+    """What a file says of a body that is pushed."""
+
+    name: str
+    surface: LimitSurface
+    outline: Outline
+    reference_point: Floats
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
+    top = argparse.ArgumentParser(
+        prog="plot_push",
+        description=__doc__,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    top.add_argument("model", type=Path, metavar="MODEL", help="model or contact file (.yaml)")
+    add_picture_options(top, "push.png")
+    top.add_argument(
+        "--path",
+        type=float,
+        nargs="+",
+        metavar="X",
+        help="corners x y of the path of the tip's centre, two or more [m]",
+    )
+    top.add_argument(
+        "--pose",
+        type=float,
+        nargs=3,
+        default=[0.0, 0.0, 0.0],
+        metavar=("X", "Y", "ANGLE"),
+        help="where the body begins [m, m, rad] (0 0 0)",
+    )
+    top.add_argument(
+        "--tip-radius", type=float, default=0.005, help="of the pusher [m] (%(default)g)"
+    )
+    top.add_argument(
+        "--friction",
+        type=float,
+        default=0.3,
+        help="coefficient between tip and body, 0 to inf (%(default)g)",
+    )
+    top.add_argument(
+        "--accuracy",
+        type=float,
+        default=DEFAULT_ACCURACY,
+        help="error of the end pose that is aimed at [m] (%(default)g)",
+    )
+    top.add_argument(
+        "--overlap",
+        choices=OVERLAPS,
+        default=OVERLAPS[0],
+        help="of tip and body at the start: taken as an offset, or pushed out (%(default)s)",
+    )
+    top.add_argument(
+        "--animate", type=Path, metavar="FILM", help=f"film to write too: {', '.join(FILMS)}"
+    )
+    top.add_argument(
+        "--seconds", type=float, default=4.0, help="length of the film [s] (%(default)g)"
+    )
+    return top
+
+
+def read_body(path: Path) -> Body:
+    """Read a body that can be pushed.
+
+    Raises:
+        FileError: The file is neither a model nor a contact.
+        DataError: It has no outline.
+    """
+    if "kind" in read_yaml(path):
+        model = read_surface_model(path)
+        name, surface, outline = model.name, model.surface, model.outline
+        about = np.array(model.reference_point)
+    else:
+        contact = read_contact(path)
+        name, surface, outline = contact.name, contact.surface, contact.outline
+        about = contact.reference_point
+    if outline is None:
+        raise DataError(
+            f"{path}: has no outline for a tip to touch: add `outline`, such as "
+            "`outline: {kind: rectangle, size: [0.1, 0.06]}`"
+        )
+    return Body(name, surface, outline, about)
+
+
+def default_path(outline: Outline, pose: Floats, radius: float) -> Floats:
+    """Return a path from the left, a quarter of the height above the middle."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    corners = outline.drawn() @ np.array([[c, s], [-s, c]]) + pose[:2]
+    (left, bottom), (right, top) = corners.min(axis=0), corners.max(axis=0)
+    begin = left - 2.0 * radius - 0.05 * (right - left)
+    end, height = 0.5 * (left + right), 0.25 * bottom + 0.75 * top
+    return np.array([[begin, height], [end, height]])
+
+
+def run(options: argparse.Namespace) -> None:
+    """Read, simulate, say, draw."""
+    check_picture(options, [options.model])
+    check_ranges(options, {"seconds": (0.1, 120.0)})
+    if options.animate is not None:
+        check_output(options.animate, FILMS, [options.model])
+    if options.path is not None and (len(options.path) < 4 or len(options.path) % 2):
+        raise RangeError("--path takes two or more corners, each an x and a y")
+    body = read_body(options.model)
+    pose = np.array(options.pose)
+    if options.path is None:
+        path = default_path(body.outline, pose, options.tip_radius)
+    else:
+        path = np.array(options.path).reshape(-1, 2)
+    found = simulate_push(
+        body.surface,
+        body.outline,
+        options.tip_radius,
+        options.friction,
+        pose,
+        path,
+        accuracy=options.accuracy,
+        overlap=options.overlap,
+        reference_point=body.reference_point,
+    )
+    # Rounded to what is printed, and without the sign of zero.
+    x, y = np.round(found.end_pose[:2], 6) + 0.0
+    angle = round(math.degrees(found.end_pose[2]), 4) + 0.0
+    print(f"body        {body.name}")
+    touched = "never" if found.touched_at is None else f"after {1e3 * found.touched_at:.3f} mm"
+    print(f"touched     {touched}")
+    if found.left_at is not None:
+        print(f"left        after {1e3 * found.left_at:.3f} mm")
+    kept = [mode.value for mode in found.modes[:-1]]
+    modes = [mode for place, mode in enumerate(kept) if place == 0 or kept[place - 1] != mode]
+    print(f"modes       {', '.join(modes)}")
+    print(f"end         x {x:.6f} m, y {y:.6f} m, angle {angle:.4f} deg")
+    print(f"error       about {max(found.error, 1e-15):.1g} m, by {found.evaluations} evaluations")
+    title = f"{body.name}, friction {options.friction:g}"
+    save_figure(
+        draw_push(found, body.outline, options.tip_radius, title), options.output, options.dpi
+    )
+    print(f"written     {options.output}")
+    if options.animate is not None:
+        write_film(found, body.outline, options.tip_radius, options.animate, options.seconds)
+        print(f"written     {options.animate}")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the program and return its exit code."""
+    return run_program(parser(), run, argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
