@@ -15,7 +15,7 @@ from limit_surface_ros.decay.fit import METHODS, fit_decay
 from limit_surface_ros.errors import LimitSurfaceError, RangeError
 from limit_surface_ros.tools.decay_input import add_input_options, read_input
 from limit_surface_ros.tools.fit_decay import add_method_options, beyond, method_options
-from limit_surface_ros.tools.program import progress_bar, run_program
+from limit_surface_ros.tools.program import program_parser, progress_bar, run_program
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,12 +33,7 @@ HEADINGS = ("method", "terms", "error", "beyond", "right-most [1/s]", "time [s]"
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    top = argparse.ArgumentParser(
-        prog="compare_decays",
-        description=__doc__,
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    top = program_parser("compare_decays", __doc__, EXAMPLES, "response", "bag")
     add_input_options(top)
     top.add_argument(
         "--methods", nargs="+", choices=METHODS, default=list(METHODS), help="default: all"

@@ -33,7 +33,7 @@ from limit_surface_ros.plots.distributions import draw_distributions
 from limit_surface_ros.surface.measures import load_error, quantiles, velocity_error
 from limit_surface_ros.tools.fit_options import OF_AUTO
 from limit_surface_ros.tools.options import check_output, named_path, refuse_unused
-from limit_surface_ros.tools.program import progress_bar, run_program
+from limit_surface_ros.tools.program import program_parser, progress_bar, run_program
 from limit_surface_ros.tools.same_point import About, require_one_point
 from limit_surface_ros.tools.surface_fit import (
     RANGES,
@@ -90,11 +90,8 @@ WITH_TERMS = ("thesis", "norms", "dissipation")
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    top = argparse.ArgumentParser(
-        prog="compare_surfaces",
-        description=__doc__,
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    top = program_parser(
+        "compare_surfaces", __doc__, EXAMPLES, "surface", "contact", "body", "pushes", "bag"
     )
     top.add_argument(
         "data", type=named_path, help="a contact file, recorded pushes, or a ROS 2 bag"

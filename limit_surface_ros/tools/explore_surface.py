@@ -13,7 +13,7 @@ from limit_surface_ros.export.explorer import MOST_MODELS, explorer_page
 from limit_surface_ros.files.atomic_write import write_atomically
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.tools.options import check_output
-from limit_surface_ros.tools.program import run_program
+from limit_surface_ros.tools.program import program_parser, run_program
 from limit_surface_ros.tools.same_point import About, require_one_point
 
 if TYPE_CHECKING:
@@ -32,12 +32,7 @@ examples:
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    top = argparse.ArgumentParser(
-        prog="explore_surface",
-        description=__doc__,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    top = program_parser("explore_surface", __doc__, EPILOG, "surface")
     top.add_argument(
         "models",
         nargs="+",

@@ -12,7 +12,7 @@ from limit_surface_ros.export.targets import SUFFIXES, export_surface
 from limit_surface_ros.files.atomic_write import write_atomically
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.tools.options import check_output
-from limit_surface_ros.tools.program import run_program
+from limit_surface_ros.tools.program import program_parser, run_program
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,12 +40,7 @@ More: docs/how_to/use_a_model_in_an_optimiser.md and docs/how_to/use_a_model_in_
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    top = argparse.ArgumentParser(
-        prog="export_surface",
-        description=__doc__,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    top = program_parser("export_surface", __doc__, EPILOG, "surface")
     top.add_argument("model", type=Path, metavar="MODEL", help="model file (.yaml)")
     top.add_argument("--to", required=True, choices=list(SUFFIXES), help="what to export to")
     top.add_argument(

@@ -31,7 +31,7 @@ from limit_surface_ros.surface.convexity import NotConvexWarning
 from limit_surface_ros.tools.executors import CLUSTER_IN_FLIGHT, check_address, dask_executor
 from limit_surface_ros.tools.fit_options import refuse_options_of_others
 from limit_surface_ros.tools.options import refuse_empty
-from limit_surface_ros.tools.program import FAILED, progress_bar, run_program
+from limit_surface_ros.tools.program import FAILED, program_parser, progress_bar, run_program
 from limit_surface_ros.tools.surface_fit import (
     add_fit_options,
     add_frame_option,
@@ -82,12 +82,7 @@ class CatalogueObject:
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    top = argparse.ArgumentParser(
-        prog="fit_catalogue",
-        description=__doc__,
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    top = program_parser("fit_catalogue", __doc__, EXAMPLES, "contact", "body", "pushes", "bag")
     top.add_argument("folder", type=Path, help=f"a folder in which each file is {ACCEPTED}")
     top.add_argument(
         "-o",

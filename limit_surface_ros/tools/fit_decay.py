@@ -32,7 +32,7 @@ from limit_surface_ros.tools.csv_options import OF_RESPONSES
 from limit_surface_ros.tools.decay_input import add_input_options, read_input
 from limit_surface_ros.tools.delay_report import system_in_words
 from limit_surface_ros.tools.options import check_output, refuse_empty, refuse_unused
-from limit_surface_ros.tools.program import run_program
+from limit_surface_ros.tools.program import program_parser, run_program
 from limit_surface_ros.tools.training_data import is_bag
 
 if TYPE_CHECKING:
@@ -83,12 +83,7 @@ MOST_SHOWN, MOST_WRITTEN = 8, 1000
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    top = argparse.ArgumentParser(
-        prog="fit_decay",
-        description=__doc__,
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    top = program_parser("fit_decay", __doc__, EXAMPLES, "response", "bag")
     add_input_options(top)
     top.add_argument(
         "-n",

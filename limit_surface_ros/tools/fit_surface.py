@@ -19,7 +19,7 @@ from limit_surface_ros.fitting.search import AGREEMENT, process_pool
 from limit_surface_ros.fitting.workers import available_cores
 from limit_surface_ros.tools.fit_options import refuse_options_of_others
 from limit_surface_ros.tools.options import check_output, named_path, refuse_empty
-from limit_surface_ros.tools.program import progress_bar, run_program
+from limit_surface_ros.tools.program import program_parser, progress_bar, run_program
 from limit_surface_ros.tools.surface_fit import (
     add_fit_options,
     add_frame_option,
@@ -48,12 +48,7 @@ NO_COST = 1e-12
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    top = argparse.ArgumentParser(
-        prog="fit_surface",
-        description=__doc__,
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    top = program_parser("fit_surface", __doc__, EXAMPLES, "contact", "body", "pushes", "bag")
     top.add_argument("input", type=named_path, help=ACCEPTED)
     top.add_argument(
         "-o", "--output", type=Path, required=True, help="model file to write (.yaml)"

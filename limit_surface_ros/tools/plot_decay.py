@@ -16,7 +16,7 @@ from limit_surface_ros.plots.decay_view import PROJECTION, draw_decay
 from limit_surface_ros.tools.csv_options import add_response_options, response_of_csv
 from limit_surface_ros.tools.decay_input import after, without
 from limit_surface_ros.tools.options import add_picture_options, check_picture
-from limit_surface_ros.tools.program import run_program
+from limit_surface_ros.tools.program import program_parser, run_program
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,12 +37,7 @@ examples:
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    top = argparse.ArgumentParser(
-        prog="plot_decay",
-        description=__doc__,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    top = program_parser("plot_decay", __doc__, EPILOG, "decay", "response")
     top.add_argument("model", type=Path, metavar="MODEL", help="model file (.yaml)")
     add_picture_options(top, "decay.png")
     top.add_argument(

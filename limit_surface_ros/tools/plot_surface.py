@@ -20,7 +20,7 @@ from limit_surface_ros.plots.surface_view import draw_surfaces
 from limit_surface_ros.surface.sampling import facet_loads, random_motions
 from limit_surface_ros.tools.csv_options import add_cell_options, cell_options
 from limit_surface_ros.tools.options import add_picture_options, check_picture
-from limit_surface_ros.tools.program import run_program
+from limit_surface_ros.tools.program import program_parser, run_program
 from limit_surface_ros.tools.same_point import About, require_one_point
 
 if TYPE_CHECKING:
@@ -46,12 +46,7 @@ examples:
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    top = argparse.ArgumentParser(
-        prog="plot_surface",
-        description=__doc__,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    top = program_parser("plot_surface", __doc__, EPILOG, "surface", "contact", "pushes")
     top.add_argument(
         "models", nargs="+", type=Path, metavar="MODEL", help="model files (.yaml), up to four"
     )

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
+import textwrap
 import warnings
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -13,7 +15,6 @@ from limit_surface_ros.errors import LimitSurfaceError
 from limit_surface_ros.runtime import INTERRUPTED
 
 if TYPE_CHECKING:
-    import argparse
     from collections.abc import Callable, Iterator, Sequence
     from typing import Protocol, TextIO
 
@@ -25,8 +26,45 @@ if TYPE_CHECKING:
             ...
 
 
+# Where all of the files is told, in a clone and in the documentation.
+FILES_PAGE = "docs/reference/files.md"
+# What the files hold that programs read, for their help.
+FILES = {
+    "contact": "contact (.yaml): `points` [m] with the `friction_limits` [N] of a few feet, or a "
+    "`shape` with its `pressure`, `friction_coefficient` and `normal_force` [N]",
+    "body": "robot description (.urdf, .sdf): the link that stands on the ground, its collision "
+    "shapes, mass and friction",
+    "pushes": "pushes (.csv): columns fx_N, fy_N, tau_Nm, the load about the reference point, and "
+    "vx, vy, omega, the motion that it caused",
+    "bag": "bag (a folder, .mcap, .db3, .bag): messages of loads, motions or poses, or of numbers",
+    "surface": "surface model (.yaml): a limit surface, as fit_surface writes it",
+    "decay": "decay model (.yaml): a sum of exponentials, as fit_decay writes it",
+    "response": "response (.csv): a column of times [s] and one of the value that dies away",
+}
 FAILED = 1
 USAGE_ERROR = 2
+
+
+def program_parser(
+    name: str, description: str, epilog: str, *files: str
+) -> argparse.ArgumentParser:
+    """Return a parser whose help ends in an epilog and in what the program's files hold.
+
+    Args:
+        name: Of the program.
+        description: What it does, a module's docstring.
+        epilog: Examples and remarks.
+        files: What it reads, keys of `FILES`.
+    """
+    wrap = textwrap.TextWrapper(96, initial_indent="  ", subsequent_indent="      ")
+    told = "\n".join(wrap.fill(FILES[each]) for each in files)
+    page = f"\nfiles (all keys, columns and units: {FILES_PAGE}):\n{told}\n" if files else ""
+    return argparse.ArgumentParser(
+        prog=name,
+        description=description,
+        epilog=epilog + page,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
 
 
 def run_program(

@@ -16,7 +16,7 @@ from limit_surface_ros.thesis.run import carry_out
 from limit_surface_ros.thesis.settings import FULL, QUICK
 from limit_surface_ros.thesis.store import Store
 from limit_surface_ros.thesis.studies import STUDIES
-from limit_surface_ros.tools.program import progress_bar, run_program
+from limit_surface_ros.tools.program import program_parser, progress_bar, run_program
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,12 +40,7 @@ examples:
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    top = argparse.ArgumentParser(
-        prog="reproduce_thesis",
-        description=__doc__,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    top = program_parser("reproduce_thesis", __doc__, EPILOG)
     top.add_argument("out", type=Path, metavar="OUT", help="folder to write; made if missing")
     top.add_argument("--quick", action="store_true", help="smaller sizes, under a minute")
     top.add_argument(
