@@ -1,37 +1,53 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Coefficients re-estimated while samples of a response come in; the rates stay as they are.
+"""What samples of a response say of its decay model, while they come in.
 
-Fixed rates make a decay model linear in its coefficients, so that recursive least squares
-corrects it at a cost per sample that never grows. The estimate minimises
+Several families of responses near the model (`families`) are fitted to the samples by
+Gauss-Newton's method from where they were, with normal priors. The evidence of each,
+chi^2 + prior + log det (information) - log det (prior information), chooses among them: Occam's
+razor of Laplace's approximation [1]. Residuals are tested against the stated noise, so that a
+response of no family is told and not believed.
 
-    sum_k forgetting^(n - k) (y_k - x(t_k))^2 / noise^2  +  (w - w0)' P0^-1 (w - w0)
-
-over the weights w of `real_basis`; the second term ties it to the model that was fitted offline
-(w0) and is never forgotten. The usual recursion lets the covariance grow without end once the
-terms have died away ("wind-up"); here it never exceeds P0. The triangular root of the information
-matrix is carried by orthogonal transformations (G. J. Bierman, Factorization Methods for Discrete
-Sequential Estimation, 1977), which keeps it definite whatever the samples are.
+At most 400 samples are kept: of more, every other one of the older half is dropped.
 
 This module imports numpy only, so that a node may load it at start-up.
+
+[1] D. J. C. MacKay, Bayesian interpolation, Neural Computation 4, 415-447, 1992,
+    doi 10.1162/neco.1992.4.3.415.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
+from statistics import median
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from limit_surface_ros.checks import as_floats, as_positive
-from limit_surface_ros.decay.basis import real_basis
-from limit_surface_ros.decay.exponential_sum import ExponentialSum
+from limit_surface_ros.decay.families import FAMILIES, Learnt
 from limit_surface_ros.errors import RangeError
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.decay.exponential_sum import ExponentialSum
+    from limit_surface_ros.decay.families import Family
+
+MOST_SAMPLES = 400
+# All families are fitted at each of the first samples, and then at each tenth.
+FIRST, EVERY = 5, 10
+FIRST_STEPS, STEPS = 4, 2
+# Families whose evidence differs by less than this fit alike.
+ALIKE = 4.0
+# A family within so much of the best widens the bounds.
+CREDIBLE = 12.0
+# Tests of the residuals: so many deviations are too many, from so many samples on.
+MOST_DEVIATIONS, LEAST_TESTED = 4.0, 8
+# Deviations in a bound, and the last samples that a bound is not below if nothing fits.
+BOUND_DEVIATIONS, LAST_SAMPLES = 3.0, 20
+# Residuals before a sample that show whether it stands alone.
+NEIGHBOURS = 5
 
 
 @dataclass(frozen=True)
@@ -41,12 +57,12 @@ class EstimationOptions:
     Attributes:
         noise: Standard deviation of a sample, in the unit of x.
         forgetting: Weight of a sample relative to the one after it, in (0, 1].
-        amplitude_spread: Standard deviation of a factor on the whole model.
-        shape_spread: Standard deviation of the departure from the model's shape, as a fraction
-            of its largest value.
-        gate: A sample further than so many standard deviations from its prediction is an outlier.
-        change_after: So many outliers in a row are a change of the response: what was learnt
-            is dropped and the samples count again.
+        gate: A sample further than so many standard deviations from its prediction, and from what
+            its neighbours are off theirs, is an outlier.
+        change_after: After so many samples in a row beyond the gate the response has changed: what
+            was learnt before them is dropped.
+        span_factor: Where the model itself does not fit, bounds are stated up to so many times the
+            time that was seen, at least 1.
 
     Raises:
         RangeError: A number is outside its range.
@@ -54,61 +70,194 @@ class EstimationOptions:
 
     noise: float
     forgetting: float = 0.999
-    amplitude_spread: float = 0.5
-    shape_spread: float = 0.1
     gate: float = 5.0
     change_after: int = 10
+    span_factor: float = 3.0
 
     def __post_init__(self) -> None:
         """Check the ranges."""
-        for name in ("noise", "amplitude_spread", "shape_spread", "gate"):
+        for name in ("noise", "gate"):
             as_positive(name, getattr(self, name))
         if not 0.0 < self.forgetting <= 1.0:
             raise RangeError(f"forgetting must be above 0 and at most 1, got {self.forgetting}")
         if self.change_after < 1:
             raise RangeError(f"change_after must be at least 1, got {self.change_after}")
+        if not self.span_factor >= 1.0:
+            raise RangeError(f"span_factor must be at least 1, got {self.span_factor}")
 
 
-class CoefficientEstimator:
-    """The corrected model of one response, and how sure it is; its memory does not grow.
+@dataclass(frozen=True)
+class Verdict:
+    """What the samples say of the model.
+
+    Attributes:
+        fits: Whether a family fits them within the stated noise; True while there are few.
+        family: Name of the family that was chosen, see `families`.
+        amplitude: Factor on the model at the onset.
+        rate: Factor s on its rates.
+        delay: Delay d [s].
+        reversed: Whether the response has the other sign, as of a sensor that is mounted the other
+            way round.
+        chi2_per_sample: Mean square of the residuals in units of the noise; NaN without samples.
+        reason: Why nothing fits, in words; empty if something does.
+    """
+
+    fits: bool = True
+    family: str = "amplitude"
+    amplitude: float = 1.0
+    rate: float = 1.0
+    delay: float = 0.0
+    reversed: bool = False
+    chi2_per_sample: float = math.nan
+    reason: str = ""
+
+
+class _Fit:
+    """One family's numbers, and what they leave of the samples."""
+
+    def __init__(self, family: Family) -> None:
+        self.family = family
+        self.numbers = family.mean
+        self.root = np.diag(1.0 / family.spread)
+        self.evidence = 0.0
+        self.chi2 = 0.0
+        self.freedom = 1
+        self.linked = 0.0
+        self.samples = 0
+
+    def update(self, times: Floats, values: Floats, deviations: Floats, steps: int) -> None:
+        """Move the numbers by so many steps of Gauss and Newton, and judge them."""
+        family = self.family
+        prior = 1.0 / family.spread
+        numbers, objective = self.numbers, math.inf
+        for _ in range(steps + 1):
+            fitted, slopes = family.values(times, numbers)
+            errors = (values - fitted) / deviations
+            away = (family.mean - numbers) * prior
+            total = float(errors @ errors + away @ away)
+            if not total <= objective:
+                # Half the way back, once; the next sample brings another step.
+                numbers = family.bounded(0.5 * (numbers + self.numbers))
+                fitted, slopes = family.values(times, numbers)
+                errors = (values - fitted) / deviations
+                away = (family.mean - numbers) * prior
+                total = float(errors @ errors + away @ away)
+                if not total <= objective:
+                    break
+            rows = np.concatenate([slopes / deviations[:, np.newaxis], np.diag(prior)])
+            information = rows.T @ rows
+            self.numbers, objective = numbers, total
+            self._judge(information, errors, away, prior)
+            step = np.linalg.solve(information, rows.T @ np.concatenate([errors, away]))
+            numbers = family.bounded(numbers + step)
+            if float(np.abs(step * prior).max()) < 1e-6:
+                break
+
+    def _judge(self, information: Floats, errors: Floats, away: Floats, prior: Floats) -> None:
+        self.root = np.linalg.cholesky(information).T
+        self.chi2 = float(errors @ errors)
+        self.freedom = max(1, len(errors) - len(prior))
+        self.linked = float(errors[1:] @ errors[:-1]) / math.sqrt(max(1, len(errors) - 1))
+        occam = 2.0 * float(np.log(np.diag(self.root)).sum() - np.log(prior).sum())
+        self.evidence = self.chi2 + float(away @ away) + occam
+        self.samples = len(errors)
+
+    @property
+    def excess(self) -> float:
+        """How many deviations chi^2 is too large (Wilson and Hilferty's cube root)."""
+        share = 2.0 / (9.0 * self.freedom)
+        root = float((self.chi2 / self.freedom) ** (1.0 / 3.0))
+        return (root - 1.0 + share) / math.sqrt(share)
+
+    @property
+    def passes(self) -> bool:
+        """Whether the residuals are what noise would be."""
+        if self.samples < LEAST_TESTED:
+            return True
+        return self.excess <= MOST_DEVIATIONS and self.linked <= MOST_DEVIATIONS
+
+    def at(self, times: Floats) -> tuple[Floats, Floats]:
+        """Return the response and its standard deviation at times, each shape (n,)."""
+        fitted, _ = self.family.values(times, self.numbers)
+        inflated = math.sqrt(max(1.0, self.chi2 / self.freedom))
+        return fitted, inflated * self.family.spread_at(times, self.numbers, self.root)
+
+
+class ResponseEstimator:
+    """What is known of one response, and how sure it is; its memory does not grow.
 
     Args:
-        model: The model that was fitted offline; its rates are kept.
+        model: The model that was fitted offline.
         options: How far samples are trusted.
 
     Attributes:
-        x: The corrected model; the given one until a sample is accepted.
-        accepted: Number of samples that count in it.
-        outliers: Number of samples that were refused for being too far from their prediction.
+        accepted: Number of samples that count.
+        outliers: Number of samples that were refused for standing out.
         residual: Last sample minus its prediction, in the unit of x; NaN before the first.
+        seen: Time of the last sample that counts [s].
 
     Raises:
         RangeError: The model is zero everywhere.
 
     Example:
+        >>> from limit_surface_ros.decay.exponential_sum import ExponentialSum
         >>> model = ExponentialSum([-1.0], [1.0])
-        >>> estimator = CoefficientEstimator(model, EstimationOptions(noise=0.01))
-        >>> for time in (0.0, 0.1, 0.2):
-        ...     _ = estimator.add(time, 1.2 * float(model(time)))
-        >>> round(float(estimator.x(0.0)), 3)
-        1.2
+        >>> estimator = ResponseEstimator(model, EstimationOptions(noise=0.01))
+        >>> for time in np.arange(0.0, 1.0, 0.02):
+        ...     _ = estimator.add(time, 1.2 * float(model(0.5 * time)))
+        >>> estimator.verdict.family, round(estimator.verdict.rate, 2)
+        ('rate', 0.5)
     """
 
     def __init__(self, model: ExponentialSum, options: EstimationOptions) -> None:
         """Start at the model."""
-        self.x = model
+        if not model.coefficients.any():
+            raise RangeError("a decay model that is zero has no size to judge its corrections by")
         self.accepted = 0
         self.outliers = 0
         self.residual = math.nan
+        self.seen = 0.0
         self._model = model
         self._options = options
-        self._prior_root = _information_root(model, options)
         self._last_time = -math.inf
-        self._outliers_in_a_row = 0
-        self._forget_all()
+        self._beyond: list[tuple[float, float]] = []
+        self._residuals: deque[float] = deque(maxlen=NEIGHBOURS)
+        self._changed = False
+        self._learnt: Learnt | None = Learnt(model)
+        self._restart()
+
+    @property
+    def learnt(self) -> Learnt:
+        """The response of the chosen family; the model's own until a sample counts."""
+        if self._learnt is None:
+            self._learnt = self._best.family.learnt(self._best.numbers)
+        return self._learnt
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the samples say of the model."""
+        best = self._best
+        if not self.accepted:
+            return Verdict()
+        reason = self._reason(best)
+        learnt = self.learnt
+        amplitude = float(best.numbers[0])
+        if best.family.name == "weights":
+            amplitude = learnt.sum.start / (self._model.start or math.nan)
+        spread = 1.0 / float(best.root[0, 0]) if len(best.numbers) == 1 else self._spread(best)
+        return Verdict(
+            fits=not reason,
+            family=best.family.name,
+            amplitude=amplitude,
+            rate=best.family.rate(best.numbers),
+            delay=learnt.delay,
+            reversed=amplitude < -BOUND_DEVIATIONS * spread,
+            chi2_per_sample=best.chi2 / max(1, best.samples),
+            reason=reason,
+        )
 
     def add(self, time: float, value: float) -> bool:
-        """Correct the model by a sample.
+        """Take a sample in.
 
         Args:
             time: Time after the onset [s], later than that of the sample before.
@@ -130,82 +279,108 @@ class CoefficientEstimator:
                 f"samples must come in the order of time: got {t:g} s after {self._last_time:g} s"
             )
         self._last_time = t
-        row = real_basis(self._model.rates, np.array([t]))[0]
-        self.residual = y - float(row @ self.x.weights)
-        if self._is_outlier(row):
+        predicted, spread = self._best.at(np.array([t]))
+        self.residual = y - float(predicted[0])
+        noise, gate = self._options.noise, self._options.gate
+        beyond = abs(self.residual) > gate * math.hypot(noise, float(spread[0]))
+        shared = median(self._residuals) if len(self._residuals) == NEIGHBOURS else 0.0
+        alone = beyond and abs(self.residual - shared) > gate * noise
+        self._residuals.append(self.residual)
+        self._beyond = [*self._beyond, (t, y)] if beyond else []
+        if len(self._beyond) >= self._options.change_after:
+            self.outliers += alone
+            self._begin_anew()
+            return not alone
+        if alone:
             self.outliers += 1
-            self._outliers_in_a_row += 1
-            if self._outliers_in_a_row >= self._options.change_after:
-                self._forget_all()
             return False
-        self._outliers_in_a_row = 0
-        self._learn(row, y - float(row @ self._model.weights))
+        self._keep(t, y)
         self.accepted += 1
+        self._fit()
         return True
 
-    def spread(self, times: ArrayLike) -> Floats:
-        """Return the standard deviation of the corrected model at given times.
+    def bounds(self, times: Floats) -> Floats:
+        """Return what the response is expected to differ from `learnt` by at most, shape (n,).
 
-        Args:
-            times: Shape (n,) [s].
-
-        Returns:
-            Shape (n,), in the unit of x.
+        Three standard deviations of the mixture of all families, and the distance to each that
+        is credible; where nothing fits, at least the largest of the last samples.
         """
-        rows = real_basis(self._model.rates, as_floats("times", times))
-        deviations: Floats = np.sqrt((np.linalg.solve(self._root.T, rows.T) ** 2).sum(axis=0))
-        return deviations
+        centre = self.learnt(times)
+        fits = [fit for fit in self._fits if fit.samples == self._best.samples] or [self._best]
+        least = min(fit.evidence for fit in fits)
+        weights = np.array([math.exp(-0.5 * (fit.evidence - least)) for fit in fits])
+        weights /= weights.sum()
+        results = [fit.at(times) for fit in fits]
+        mean = sum(w * values for w, (values, _) in zip(weights, results, strict=True))
+        variance = sum(
+            w * (spread**2 + (values - mean) ** 2)
+            for w, (values, spread) in zip(weights, results, strict=True)
+        )
+        bounds: Floats = np.abs(mean - centre) + BOUND_DEVIATIONS * np.sqrt(variance)
+        for fit, (values, spread) in zip(fits, results, strict=True):
+            if fit.evidence - least <= CREDIBLE and fit.passes:
+                bounds = np.maximum(bounds, np.abs(values - centre) + spread)
+        if self._reason(self._best):
+            last = float(np.abs(self._values[-LAST_SAMPLES:]).max())
+            bounds = np.maximum(bounds, last + BOUND_DEVIATIONS * self._options.noise)
+        return bounds
 
-    def _forget_all(self) -> None:
-        self._root = self._prior_root
-        self._departure = np.zeros(len(self._root))
-        self._outliers_in_a_row = 0
+    def _reason(self, best: _Fit) -> str:
+        if self._changed:
+            return "the response has changed, and what was learnt before no longer holds"
+        if best.passes:
+            return ""
+        # Larger noise alone leaves neighbouring residuals as independent as before.
+        if best.linked * best.samples > MOST_DEVIATIONS * best.chi2:
+            return "no family of responses near the model follows the measurements"
+        return "the measurements are noisier than is stated"
 
-    def _is_outlier(self, row: Floats) -> bool:
-        doubt = np.linalg.solve(self._root.T, row)
-        expected = math.sqrt(self._options.noise**2 + float(doubt @ doubt))
-        return not abs(self.residual) <= self._options.gate * expected
+    def _spread(self, fit: _Fit) -> float:
+        """Return the standard deviation of the first number."""
+        unit = np.zeros(len(fit.numbers))
+        unit[0] = 1.0
+        return float(np.linalg.norm(np.linalg.solve(fit.root.T, unit)))
 
-    def _learn(self, row: Floats, departure: float) -> None:
-        """Fold in one equation row . (w - w0) = departure and solve for w."""
-        kept = self._options.forgetting
-        size = len(row)
-        rows = np.zeros((2 * size + 1, size + 1))
-        rows[:size, :size] = math.sqrt(kept) * self._root
-        rows[:size, size] = math.sqrt(kept) * self._departure
-        # What is forgotten of the samples is not forgotten of the prior.
-        rows[size:-1, :size] = math.sqrt(1.0 - kept) * self._prior_root
-        rows[-1, :size] = row / self._options.noise
-        rows[-1, size] = departure / self._options.noise
-        triangle = _triangular(rows)
-        self._root, self._departure = triangle[:size, :size], triangle[:size, size]
-        change = np.linalg.solve(self._root, self._departure)
-        self.x = ExponentialSum.from_weights(self._model.rates, self._model.weights + change)
+    def _restart(self) -> None:
+        self._fits = [_Fit(family(self._model)) for family in FAMILIES]
+        self._best = self._fits[0]
+        self._times, self._values = np.zeros(0), np.zeros(0)
+        self._ages = np.zeros(0)
 
+    def _begin_anew(self) -> None:
+        """Drop all samples but those in a row that the fit before could not have predicted."""
+        samples, self._beyond = self._beyond, []
+        self._restart()
+        self._changed = True
+        for t, y in samples:
+            self._keep(t, y)
+        self.accepted += 1
+        self._fit()
 
-def _information_root(model: ExponentialSum, options: EstimationOptions) -> Floats:
-    """Return the upper triangular R, shape (terms, terms), with R'R = P0^-1.
+    def _keep(self, t: float, y: float) -> None:
+        if len(self._times) >= MOST_SAMPLES:
+            half = MOST_SAMPLES // 2
+            kept = np.append(np.arange(0, half, 2), np.arange(half, MOST_SAMPLES))
+            self._times, self._values = self._times[kept], self._values[kept]
+            self._ages = self._ages[kept]
+        self._times, self._values = np.append(self._times, t), np.append(self._values, y)
+        self._ages = np.append(self._ages + 1.0, 0.0)
+        self.seen = t
 
-    P0 holds a common factor on all weights and, for each weight alone, as much as changes x by
-    `shape_spread` of its largest value when all of them do.
-    """
-    weights = model.weights
-    reach = 5.0 / abs(model.slowest_rate) if model.slowest_rate else 1.0
-    peak = float(np.abs(model(np.linspace(0.0, reach, 512))).max())
-    if not peak > 0.0:
-        raise RangeError("a decay model that is zero has no size to judge its corrections by")
-    alone = options.shape_spread * peak / math.sqrt(len(weights))
-    together = options.amplitude_spread * weights
-    # (alone^2 I + together together')^-1 as a sum of squares, by Sherman and Morrison.
-    size2 = float(together @ together)
-    direction = together / math.sqrt(size2)
-    along = alone / math.hypot(alone, math.sqrt(size2))
-    root = (np.eye(len(weights)) - (1.0 - along) * np.outer(direction, direction)) / alone
-    return _triangular(root)
-
-
-def _triangular(rows: Floats) -> Floats:
-    """Return the upper triangular R with R'R = rows' rows."""
-    # The stubs of numpy give every mode the result of the one that returns Q as well.
-    triangle: Floats = np.linalg.qr(rows, mode="r")  # type: ignore[assignment]
-    return triangle
+    def _fit(self) -> None:
+        count = len(self._times)
+        deviations = self._options.noise * self._options.forgetting ** (-0.5 * self._ages)
+        self._learnt = None
+        if count > FIRST and self.accepted % EVERY:
+            self._best.update(self._times, self._values, deviations, STEPS - 1)
+            return
+        steps = FIRST_STEPS if count <= 2 * EVERY else STEPS
+        for fit in self._fits:
+            try:
+                fit.update(self._times, self._values, deviations, steps)
+            except np.linalg.LinAlgError:
+                fit.evidence = math.inf
+        least = min(fit.evidence for fit in self._fits)
+        self._best = next(fit for fit in self._fits if fit.evidence <= least + ALIKE)
+        if self._changed and count >= 5 * self._options.change_after and self._best.passes:
+            self._changed = False

@@ -26,7 +26,7 @@ from limit_surface_ros.decay.basis import as_rates, count_terms, real_basis
 from limit_surface_ros.decay.esprit import rates_of_subspace, signal_subspace
 from limit_surface_ros.decay.outliers import neighbour_weights, stand_out
 from limit_surface_ros.decay.rates import take
-from limit_surface_ros.decay.varpro import FreeFit, Samples, VariableProjection
+from limit_surface_ros.decay.varpro import FreeFit, Projection, Samples, VariableProjection
 from limit_surface_ros.errors import SolverError
 
 if TYPE_CHECKING:
@@ -49,6 +49,8 @@ ROBUST_ROUNDS = 3
 MORE_MISFIT = 1.3
 # Numbers that a real rate, a pair and a constant count in BIC.
 REAL_PENALTY, PAIR_PENALTY, OFFSET_PENALTY = 2, 6, 1
+# What the logarithm of the number of frequencies up to a pair's counts beside a sum of squares.
+SEARCHED = 3.0
 MOST_AUTOMATIC = 15
 # The path ends when so many numbers of terms in a row brought no lower BIC.
 PATIENCE = 4
@@ -142,12 +144,16 @@ def free_rates(
 def _judge(fit: FreeFit, samples: Samples) -> Tried:
     squares = float(((samples.weights * fit.residuals) ** 2).sum())
     count = int(np.count_nonzero(samples.weights))
-    pairs = int(np.count_nonzero(fit.rates.imag))
-    numbers = REAL_PENALTY * (len(fit.rates) - pairs) + PAIR_PENALTY * pairs
-    numbers += OFFSET_PENALTY * samples.offset
+    numbers = _numbers(fit.rates) + OFFSET_PENALTY * samples.offset
     # Residuals far below the noise tell nothing of the number of terms.
     mean = max(squares / count, (1e-3 * samples.noise) ** 2)
     return Tried(fit.terms, count * math.log(mean) + numbers * math.log(count), math.sqrt(mean))
+
+
+def _numbers(rates: Complexes) -> int:
+    """Return how many numbers the rates and their coefficients count as."""
+    pairs = int(np.count_nonzero(rates.imag))
+    return REAL_PENALTY * (len(rates) - pairs) + PAIR_PENALTY * pairs
 
 
 class _Path:
@@ -176,7 +182,7 @@ class _Path:
                 points.append(self.problem.improve(start, FIRST_STEPS))
             except linalg.LinAlgError:
                 continue
-        points.sort(key=lambda point: point.cost)
+        points.sort(key=self._criterion)
         ends = []
         for point in points[:KEPT_STARTS]:
             try:
@@ -185,7 +191,16 @@ class _Path:
                 ends.append(point)
         if not ends:
             return None
-        return self.problem.result(min(ends, key=lambda point: point.cost))
+        return self.problem.result(min(ends, key=self._criterion))
+
+    def _criterion(self, point: Projection) -> float:
+        """Compare fits with as many terms: the noise is followed by the best of many frequencies.
+
+        Among k independent ones the best lowers the sum of squares by about 2 log k, and its
+        damping is searched for too.
+        """
+        periods = point.rates.imag * self.problem.samples.end / (2.0 * np.pi)
+        return point.cost + SEARCHED * float(np.log1p(periods).sum())
 
     def _starts(self, path: list[FreeFit], terms: int) -> list[Complexes]:
         starts: list[Complexes] = [self._with_real(path[-1] if path else None)]

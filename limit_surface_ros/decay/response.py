@@ -14,18 +14,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.checks import as_floats
-from limit_surface_ros.decay.estimation import CoefficientEstimator
+from limit_surface_ros.decay.estimation import ResponseEstimator
 from limit_surface_ros.errors import NoOnsetError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.decay.estimation import EstimationOptions
+    from limit_surface_ros.decay.estimation import EstimationOptions, Verdict
     from limit_surface_ros.decay.exponential_sum import ExponentialSum
+    from limit_surface_ros.decay.families import Learnt
 
-# Of the estimate, in bounds.
-STANDARD_DEVIATIONS = 3.0
 # x(0) below this share of the sum of |c| is rounding and no value to scale by.
 SMALLEST_START = 1e-12
 
@@ -50,6 +51,8 @@ class Response:
         model: The decay model as it was fitted.
         max_error: Its largest error, in the unit of x.
         options: How far measurements are trusted over it; `noise` as a fraction of the onset.
+        stated: What is stated of the model's error at times [s], shape (n,), NaN where nothing
+            is; `max_error` everywhere if None.
 
     Attributes:
         start: x(0) of the model as it was fitted.
@@ -59,21 +62,31 @@ class Response:
     """
 
     def __init__(
-        self, model: ExponentialSum, max_error: float, options: EstimationOptions
+        self,
+        model: ExponentialSum,
+        max_error: float,
+        options: EstimationOptions,
+        stated: Callable[[Floats], Floats] | None = None,
     ) -> None:
         """Start with the model as it was fitted."""
         self.start = onset_value(model)
         self._model = model
         self._max_error = max_error
+        self._stated = stated or (lambda times: np.full(times.shape, max_error))
         # A sample departs from any sum of these exponentials by noise and by the fit's error.
         noise = math.hypot(options.noise * abs(self.start), max_error)
         self._options = replace(options, noise=noise)
         self.forget()
 
     @property
-    def x(self) -> ExponentialSum:
-        """The present model."""
-        return self._estimator.x
+    def x(self) -> Learnt:
+        """The response as it is known now."""
+        return self._estimator.learnt
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the measurements say of the model."""
+        return self._estimator.verdict
 
     @property
     def samples(self) -> int:
@@ -90,27 +103,46 @@ class Response:
         """Last measured fraction minus its prediction; NaN before the first."""
         return self._estimator.residual / self.start
 
+    @property
+    def known_until(self) -> float:
+        """Time [s] after which nothing is stated because the model itself does not fit."""
+        verdict = self.verdict
+        if not self.samples or (verdict.fits and verdict.family == "amplitude"):
+            return math.inf
+        return self._options.span_factor * self._estimator.seen
+
     def fractions(self, times: ArrayLike) -> Floats:
         """Return what is left of the onset at given times [s], each >= 0."""
-        fractions: Floats = self.x(times) / self.start
+        fractions: Floats = self.x(as_floats("times", times)) / self.start
         return fractions
 
     def bounds(self, times: ArrayLike) -> Floats:
         """Return the largest error that is to be expected at given times, in the unit of x.
 
-        The fit's error, and after corrections three standard deviations of the estimate as well.
+        What is stated of the model, and after corrections three standard deviations of the
+        estimate, and the distance to other families that measurements do not rule out. NaN
+        where nothing is known: where nothing is stated, and where the model itself does not fit,
+        after `span_factor` times the time that was seen.
+
+        Args:
+            times: Shape (n,) [s], each >= 0.
         """
         t = as_floats("times", times)
         if not self.samples:
-            return np.full(t.shape, self._max_error)
-        return self._max_error + STANDARD_DEVIATIONS * self._estimator.spread(t)
+            return self._stated(t)
+        amplitude = max(1.0, abs(self.verdict.amplitude))
+        open_now = self._estimator.bounds(t)
+        if math.isinf(self.known_until):
+            return amplitude * self._stated(t) + open_now
+        bounds = amplitude * self._max_error + open_now
+        return np.where(t <= self.known_until, bounds, math.nan)
 
     def time_to_fraction(self, fraction: float) -> float:
         """Return the time [s] from which on no more than a fraction of the onset is left."""
         return self.x.time_to_level(fraction * abs(self.start))
 
     def learn(self, time: float, fraction: float) -> bool:
-        """Correct the coefficients by a measurement; False if it is an outlier.
+        """Correct the response by a measurement; False if it is an outlier.
 
         Args:
             time: Time after the onset [s], later than that of the measurement before.
@@ -124,4 +156,4 @@ class Response:
 
     def forget(self) -> None:
         """Return to the model as it was fitted, as when time itself was set back."""
-        self._estimator = CoefficientEstimator(self._model, self._options)
+        self._estimator = ResponseEstimator(self._model, self._options)

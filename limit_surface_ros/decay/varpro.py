@@ -123,7 +123,7 @@ class VariableProjection:
         bounded: Complexes = -decays + 1j * np.minimum(np.abs(rates.imag), self._highest)
         return bounded
 
-    def project(self, rates: Complexes) -> _Projection:
+    def project(self, rates: Complexes) -> Projection:
         """Solve for the coefficients on given rates."""
         samples, terms = self.samples, count_terms(rates)
         count, columns = len(samples.times), terms + samples.offset
@@ -148,9 +148,9 @@ class VariableProjection:
         projected = basis.T @ target
         solution = np.zeros(columns)
         solution[order[:rank]] = linalg.solve_triangular(triangle[:rank, :rank], projected)
-        return _Projection(rates, solution, basis, target - basis @ projected)
+        return Projection(rates, solution, basis, target - basis @ projected)
 
-    def improve(self, start: _Projection, steps: int) -> _Projection:
+    def improve(self, start: Projection, steps: int) -> Projection:
         """Move the rates to lower the sum of squares, by at most so many steps."""
         point, damping = start, FIRST_DAMPING
         for _ in range(steps):
@@ -176,7 +176,7 @@ class VariableProjection:
                 break
         return point
 
-    def result(self, point: _Projection) -> FreeFit:
+    def result(self, point: Projection) -> FreeFit:
         """Return what a point stands for, with the samples' residuals."""
         samples, terms = self.samples, count_terms(point.rates)
         weights = point.solution[:terms]
@@ -184,7 +184,7 @@ class VariableProjection:
         fitted = real_basis(point.rates, samples.times) @ weights + constant
         return FreeFit(point.rates, weights, constant, point.cost, samples.values - fitted)
 
-    def _jacobian(self, point: _Projection) -> Floats:
+    def _jacobian(self, point: Projection) -> Floats:
         """Return how the projected residuals fall with log a and b (Kaufman's short form)."""
         rates, count = point.rates, len(self.samples.times)
         coefficients = coefficients_of_weights(rates, point.solution[: count_terms(rates)])
@@ -210,8 +210,15 @@ class VariableProjection:
 
 
 @dataclass(frozen=True, eq=False)
-class _Projection:
-    """Rates with the coefficients solved; `basis` spans the weighted rows' columns."""
+class Projection:
+    """Rates with the coefficients solved.
+
+    Attributes:
+        rates: Shape (m,) [1/s].
+        solution: Shape (columns,), the weights and, last, the constant.
+        basis: Shape (rows, rank), orthonormal, spans the weighted rows' columns.
+        residual: Shape (rows,), weighted.
+    """
 
     rates: Complexes
     solution: Floats
@@ -220,4 +227,5 @@ class _Projection:
 
     @property
     def cost(self) -> float:
+        """Sum of the squares of all rows."""
         return float(self.residual @ self.residual)

@@ -65,10 +65,31 @@ def test_forgetting_returns_to_the_model_and_to_any_time():
         response.learn(1.0, 0.3)
     response.forget()
     assert response.samples == 0
-    assert response.x is MODEL
+    assert response.x.sum is MODEL
     assert response.learn(1.0, float(MODEL(1.0)) / -2.5)
 
 
 def test_a_model_that_starts_at_zero_has_no_response_to_an_onset():
     with pytest.raises(NoOnsetError):
         Response(ExponentialSum([-1.0, -2.0], [1.0, -1.0]), 0.0, OPTIONS)
+
+
+def test_bounds_end_where_nothing_is_known():
+    random = np.random.default_rng(1)
+    late = np.array([0.5, 2.9, 3.1, 50.0])
+
+    def stated(times):
+        return np.where(times <= 10.0, 0.02, math.nan)
+
+    fitting = Response(MODEL, 0.02, OPTIONS, stated)
+    np.testing.assert_array_equal(fitting.bounds(late), [0.02, 0.02, 0.02, math.nan])
+    other = Response(MODEL, 0.02, OPTIONS, stated)
+    for t in np.arange(0.0, 1.001, 0.01):
+        fitting.learn(t, float(MODEL(t)) / -2.5 + 0.01 * random.normal())
+        other.learn(t, float(MODEL(0.6 * t)) / -2.5 + 0.01 * random.normal())
+    # The model fits: it holds as far as it is stated to. It does not: nor does what it states.
+    np.testing.assert_array_equal(np.isfinite(fitting.bounds(late)), [True, True, True, False])
+    assert fitting.known_until == math.inf
+    assert other.verdict.family != "amplitude"
+    assert other.known_until == pytest.approx(3.0)
+    np.testing.assert_array_equal(np.isfinite(other.bounds(late)), [True, True, False, False])
