@@ -51,8 +51,8 @@ class Response:
         model: The decay model as it was fitted.
         max_error: Its largest error, in the unit of x.
         options: How far measurements are trusted over it; `noise` as a fraction of the onset.
-        stated: What is stated of the model's error at times [s], shape (n,), NaN where nothing
-            is; `max_error` everywhere if None.
+        stated: What is stated of the model's error at times [s], shape (n,), infinite where
+            nothing is; `max_error` everywhere if None.
 
     Attributes:
         start: x(0) of the model as it was fitted.
@@ -120,7 +120,7 @@ class Response:
         """Return the largest error that is to be expected at given times, in the unit of x.
 
         What is stated of the model, and after corrections three standard deviations of the
-        estimate, and the distance to other families that measurements do not rule out. NaN
+        estimate, and the distance to other families that measurements do not rule out. Infinite
         where nothing is known: where nothing is stated, and where the model itself does not fit,
         after `span_factor` times the time that was seen.
 
@@ -135,7 +135,7 @@ class Response:
         if math.isinf(self.known_until):
             return amplitude * self._stated(t) + open_now
         bounds = amplitude * self._max_error + open_now
-        return np.where(t <= self.known_until, bounds, math.nan)
+        return np.where(t <= self.known_until, bounds, math.inf)
 
     def time_to_fraction(self, fraction: float) -> float:
         """Return the time [s] from which on no more than a fraction of the onset is left."""

@@ -111,7 +111,7 @@ class DecayModel:
         """Return what |x - response| does not exceed at given times, as the file states it.
 
         On the time span the error that was measured there; after it, what the sum and the
-        response may differ by if the response does as the tail assumes. NaN where the file
+        response may differ by if the response does as the tail assumes. Infinite where the file
         states nothing: before the span, and after it without a tail.
 
         Args:
@@ -122,11 +122,8 @@ class DecayModel:
         """
         t = as_floats("times", times)
         start, end = self.time_span
-        after = self.tail.error if self.tail is not None else float("nan")
-        after = max(after, self.max_error) if self.tail is not None else after
-        bounds: Floats = np.where(
-            t < start, float("nan"), np.where(t <= end, self.max_error, after)
-        )
+        after = np.inf if self.tail is None else max(self.tail.error, self.max_error)
+        bounds: Floats = np.where(t < start, np.inf, np.where(t <= end, self.max_error, after))
         return bounds
 
 

@@ -105,4 +105,4 @@ def test_a_model_states_its_bounds_where_something_is_known():
     np.testing.assert_array_equal(bounds[:2], model.max_error)
     np.testing.assert_array_equal(bounds[2:], max(fit.tail.error, model.max_error))
     silent = DecayModel("k", fit.fit.sum, (1.0, 6.0), "inf", 0.1)
-    np.testing.assert_array_equal(silent.bounds([0.5, 3.0, 7.0]), [np.nan, 0.1, np.nan])
+    np.testing.assert_array_equal(silent.bounds([0.5, 3.0, 7.0]), [np.inf, 0.1, np.inf])

@@ -79,10 +79,10 @@ def test_bounds_end_where_nothing_is_known():
     late = np.array([0.5, 2.9, 3.1, 50.0])
 
     def stated(times):
-        return np.where(times <= 10.0, 0.02, math.nan)
+        return np.where(times <= 10.0, 0.02, math.inf)
 
     fitting = Response(MODEL, 0.02, OPTIONS, stated)
-    np.testing.assert_array_equal(fitting.bounds(late), [0.02, 0.02, 0.02, math.nan])
+    np.testing.assert_array_equal(fitting.bounds(late), [0.02, 0.02, 0.02, math.inf])
     other = Response(MODEL, 0.02, OPTIONS, stated)
     for t in np.arange(0.0, 1.001, 0.01):
         fitting.learn(t, float(MODEL(t)) / -2.5 + 0.01 * random.normal())
