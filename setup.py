@@ -21,6 +21,7 @@ EXTRAS = {
 # Each program's name and the module whose main() it runs.
 PROGRAMS: dict[str, str] = {
     "explore_surface": "limit_surface_ros.tools.explore_surface",
+    "check_pushes": "limit_surface_ros.tools.check_pushes",
     "fit_catalogue": "limit_surface_ros.tools.fit_catalogue",
     "compare_surfaces": "limit_surface_ros.tools.compare_surfaces",
     "export_surface": "limit_surface_ros.tools.export_surface",

@@ -36,6 +36,7 @@ from limit_surface_ros.tools.training_data import (
     Simulation,
     check_input,
     check_scaling,
+    checked,
     naming,
     training_data_of_bag,
     training_data_of_contact,
@@ -191,6 +192,11 @@ def _add_data_options(data: argparse._ArgumentGroup) -> None:
     )
     add_cell_options(data)
     data.add_argument(
+        "--anyway",
+        action="store_true",
+        help="fit to recorded pushes although their units, axes or signs are not those of a body",
+    )
+    data.add_argument(
         "--characteristic-length",
         type=float,
         metavar="M",
@@ -295,7 +301,7 @@ def read_input(path: Path, options: argparse.Namespace) -> TrainingData:
     """
     kind = check_input(path)
     if kind == BAG:
-        return training_data_of_bag(path, options)
+        return checked(path, training_data_of_bag(path, options), options.anyway)
     if kind in (CONTACT, BODY):
         simulation = Simulation(
             options.motions,
@@ -310,7 +316,8 @@ def read_input(path: Path, options: argparse.Namespace) -> TrainingData:
             else read_body(path, options.link, options.friction_coefficient, options.normal_force)
         )
         return training_data_of_contact(path, contact, simulation, options.characteristic_length)
-    return training_data_of_pushes(path, options.rows, cell_options(options))
+    pushes = training_data_of_pushes(path, options.rows, cell_options(options))
+    return checked(path, pushes, options.anyway)
 
 
 def fit(options: argparse.Namespace, data: TrainingData, search: Search) -> FitResult:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ from limit_surface_ros.files.body_file import SUFFIXES as BODY_SUFFIXES
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.files.surface_file import LARGEST_SCALE
 from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
+from limit_surface_ros.fitting.plausibility import doubts_of_pairs
 from limit_surface_ros.fitting.simulation import simulated_pairs
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.sampling import random_motions
@@ -77,6 +78,24 @@ class TrainingData:
     doubts: tuple[str, ...] = ()
     outline: Outline | None = None
     about: Mapping[str, Any] = field(default_factory=dict)
+
+
+def checked(path: Path, data: TrainingData, anyway: bool) -> TrainingData:
+    """Refuse pushes whose units, axes or signs are not those of a body; keep other doubts.
+
+    Args:
+        path: Of the data, for the error.
+        data: Recorded pushes.
+        anyway: Whether they are taken all the same; the doubts are then told.
+
+    Raises:
+        DataError: They are not those of a body; the message names the likely cause.
+    """
+    found = doubts_of_pairs(data.training, data.characteristic_length)
+    grave = [doubt.text for doubt in found if doubt.grave]
+    if grave and not anyway:
+        raise DataError(f"{path}: {'; '.join(grave)} (--anyway fits all the same)")
+    return replace(data, doubts=(*data.doubts, *(doubt.text for doubt in found)))
 
 
 @contextmanager

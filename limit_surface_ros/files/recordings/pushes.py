@@ -120,7 +120,10 @@ class RecordedPushes:
         wrench_noise: Deviation of fx, fy [N] and tau_z [N m], shape (3,).
         clock_offset: How late wrenches are stamped, if that could be told.
         tare: The sensor's bias, if rests told it.
-        resting: Share of the recording's time in which the body rests.
+        rests: Start and end of each rest of the body, shape (k, 2) [s].
+        recording: That they were found in.
+        frame_id: The body's frame, if the recording names it.
+        notes: How it was read, in one line each.
     """
 
     pairs: Pairs
@@ -132,9 +135,18 @@ class RecordedPushes:
     wrench_noise: Floats
     clock_offset: ClockOffset | None = None
     tare: Tare | None = None
-    resting: float = 0.0
+    rests: Floats = field(default_factory=lambda: np.empty((0, 2)))
+    recording: Recording | None = None
     frame_id: str | None = None
     notes: tuple[str, ...] = field(default=())
+
+    @property
+    def resting(self) -> float:
+        """Share of the recording's time in which the body rests."""
+        if self.recording is None:
+            return 0.0
+        span = float(np.ptp(self.recording.motion_times))
+        return float(np.sum(self.rests[:, 1] - self.rests[:, 0])) / max(span, 1e-9)
 
 
 def find_pushes(
@@ -184,7 +196,6 @@ def find_pushes(
     noise = np.array([estimate_noise(times, column) for column in loads.T])
     unread = recorded - len(times)
     found = _Selected(rules, motion, speeds, runs, times, loads, noise, unread)
-    span = float(motion.times[-1] - motion.times[0])
     return RecordedPushes(
         pairs=found.pairs(),
         deviations=found.deviations,
@@ -195,7 +206,8 @@ def find_pushes(
         wrench_noise=noise,
         clock_offset=offset,
         tare=tare,
-        resting=sum(end - start for start, end in rests) / max(span, 1e-9),
+        rests=np.array(rests).reshape(-1, 2),
+        recording=recording,
     )
 
 
