@@ -29,7 +29,7 @@ FEWEST = 6
 _TURNED = math.radians(30.0)
 # A bias is told from this part of the friction force on, and so many deviations.
 _BIAS, _DEVIATIONS = 0.15, 5.0
-_FEWEST_FOR_BIAS = 15
+_FEWEST_FOR_BIAS, _ONE_WAY = 15, 0.6
 # Pushes turn the body if this part of their motion turns it, and lever arms below this part of the
 # length are those of pushes through the centre.
 _TURNS, _ARM, _USUAL_LENGTH = 0.05, 0.05, 0.05
@@ -177,10 +177,12 @@ def _doubts_of_frames(wrenches: Floats, twists: Floats) -> list[Doubt]:
         ]
     angle = math.atan2(turn[1, 0], turn[0, 0])
     if abs(angle) > math.pi - _TURNED:
+        against = int(np.count_nonzero(np.sum(wrenches * twists, axis=1) < 0.0))
         return [
             Doubt(
-                "forces point against velocities: are the wrenches those on the pusher, or are "
-                "the twists reversed? A body that slides takes power in",
+                f"{against} of {len(wrenches)} pushes have negative power, their forces point "
+                "against velocities: are the wrenches those on the pusher, or are the twists "
+                "reversed? A body that slides takes power in",
                 True,
             )
         ]
@@ -271,7 +273,9 @@ def _doubts_of_bias(wrenches: Floats, twists: Floats, length: float) -> list[Dou
     unit = _unit(twists, length)
     basis = np.column_stack([unit, unit * np.abs(unit), np.ones(len(unit))])
     loads = wrenches / np.array([1.0, 1.0, length])
-    found = np.linalg.lstsq(basis, loads, rcond=None)[0]
+    found, _, rank, _ = np.linalg.lstsq(basis, loads, rcond=None)
+    if rank < basis.shape[1] or float(np.linalg.norm(unit.mean(axis=0))) > _ONE_WAY:
+        return []  # hardly any motion has an opposite one
     left = loads - basis @ found
     spread = np.sum(left**2, axis=0) / (len(loads) - basis.shape[1])
     deviation = np.sqrt(np.linalg.pinv(basis.T @ basis)[-1, -1] * spread)
