@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""When a body that was set sliding comes to rest: a load that dies away by a decay model.
+"""From when on friction can hold a body whose load dies away by a decay model.
 
 A wrench of load factor s dies away as w(t) = w(0) x(t) / x(0). Friction is alike in both
-directions, so that the load factor is then s |x(t) / x(0)|, and the body slides while that is
-above 1, backwards where x has changed its sign.
+directions, so that the load factor is then s |x(t) / x(0)|, and friction can hold the body while
+that is at most 1. A body that something moves slowly, at a speed that has no momentum to speak
+of, rests from then on. One with mass that the load set moving does not: it is fastest then, and
+comes to rest later. `motion.sliding` tells when.
 """
 
 from __future__ import annotations
@@ -21,19 +23,19 @@ from limit_surface_ros.errors import RangeError
 if TYPE_CHECKING:
     from limit_surface_ros.decay.exponential_sum import ExponentialSum
 
-# Level of rest of a load factor so small that its inverse overflows.
+# Level of a load factor so small that its inverse overflows.
 _LARGEST = float(np.finfo(np.float64).max)
 
 
 @dataclass(frozen=True)
-class Stop:
-    """When a body that was pushed comes to rest for good; times in [s] after the onset.
+class Holding:
+    """From when on friction can hold a body for good; times in [s] after the onset.
 
     Attributes:
-        time: The load factor is at most 1 from then on; 0 if the push does not move the body.
+        time: The load factor is at most 1 from then on; 0 if it always is.
         earliest: The same if the response is smaller than the model by the error bound.
-        latest: The same if it is larger; infinity if the bound reaches the level of rest, so
-            that nothing is known.
+        latest: The same if it is larger; infinity if the bound reaches the level, so that nothing
+            is known.
         slides: Whether the load factor at the onset is at least 1.
     """
 
@@ -43,11 +45,12 @@ class Stop:
     slides: bool
 
 
-def predict_stop(x: ExponentialSum, load_factor: float, max_error: float = 0.0) -> Stop:
-    """Return when a body comes to rest whose load dies away with x(t) / x(0).
+def holds_from(x: ExponentialSum, load_factor: float, max_error: float = 0.0) -> Holding:
+    """Return from when on friction can hold a body whose load dies away with x(t) / x(0).
 
-    It rests for good from the last time on at which |x(t) / x(0)| is above 1 / load_factor: a
-    load that swings back above it moves the body again.
+    That is the last time at which |x(t) / x(0)| is above 1 / load_factor: a load that swings back
+    above it moves the body again. No body rests for good before, whatever its mass, if the load
+    turns with it; how much later one with mass does, `motion.sliding.slide` tells.
 
     Args:
         x: The decay model.
@@ -59,7 +62,12 @@ def predict_stop(x: ExponentialSum, load_factor: float, max_error: float = 0.0) 
         NoOnsetError: x(0) is zero.
         NotFiniteError: The load factor or the error is NaN or infinite.
         RangeError: The load factor or the error is negative.
-        UnstableError: x does not decay, so that sliding never ends.
+        UnstableError: x does not decay, so that friction never holds the body for good.
+
+    Example:
+        >>> from limit_surface_ros.decay.exponential_sum import ExponentialSum
+        >>> round(holds_from(ExponentialSum([-1.0], [1.0]), 3.0).time, 6)
+        1.098612
     """
     factor = float(as_floats("load factor", load_factor))
     error = float(as_floats("max_error", max_error))
@@ -69,7 +77,7 @@ def predict_stop(x: ExponentialSum, load_factor: float, max_error: float = 0.0) 
         )
     start = abs(onset_value(x))
     level = min(start / factor, _LARGEST) if factor else _LARGEST
-    return Stop(
+    return Holding(
         time=x.time_to_level(level),
         earliest=x.time_to_level(min(level + error, _LARGEST)),
         latest=x.time_to_level(level - error) if level > error else math.inf,

@@ -16,7 +16,7 @@ from limit_surface_ros.decay.response import onset_value
 from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.decay_file import DecayModel, read_decay_model
 from limit_surface_ros.files.surface_file import read_surface_model
-from limit_surface_ros.motion.holding import predict_stop
+from limit_surface_ros.motion.holding import holds_from
 from limit_surface_ros.nodes import convert, frames, planar_inputs, spin
 from limit_surface_ros.nodes.model_host import model_settings
 from limit_surface_ros.nodes.model_info import Listing, decay_info
@@ -266,7 +266,7 @@ class DecayNode(ModelNode[DecayModel]):
         load = self._inputs.wrench(body, request.wrench)
         twist, load_factor = load.surface.twist_and_load_factor(load.vector)
         factor = float(load_factor)
-        stop = predict_stop(model.sum, factor, model.max_error)
+        stop = holds_from(model.sum, factor, model.max_error)
         # A load that goes to a constant may never let the body rest.
         end = max(self.values["horizon"], stop.time if np.isfinite(stop.time) else 0.0)
         times = np.linspace(0.0, end, self.values["forecast_points"])

@@ -17,7 +17,7 @@ from std_srvs.srv import Trigger
 
 from decay_helpers import SUM, SURFACE, Bench, write_decay
 from limit_surface_ros.decay.exponential_sum import ExponentialSum
-from limit_surface_ros.motion.holding import predict_stop
+from limit_surface_ros.motion.holding import holds_from
 from node_helpers import STAMP, planar_twist, wrench_message
 
 FADING = ExponentialSum([-0.7], [2.0])
@@ -150,7 +150,7 @@ def test_the_stop_of_one_exponential_is_the_closed_form(stop):
 def test_the_stop_of_a_fitted_model_comes_with_its_error_bound(stop):
     wrench = [6.0, 3.0, 0.2]
     answer = stop(PredictStop.Request(surface="box", wrench=wrench_message(wrench)))
-    expected = predict_stop(SUM, float(SURFACE.surface.load_factor(wrench)), MAX_ERROR)
+    expected = holds_from(SUM, float(SURFACE.surface.load_factor(wrench)), MAX_ERROR)
     assert answer.stop_time == expected.time
     assert answer.earliest_stop_time == expected.earliest < answer.stop_time
     assert answer.latest_stop_time == expected.latest > answer.stop_time
