@@ -29,4 +29,52 @@ PROGRAMS: dict[str, str] = {
     "fit_decay": "limit_surface_ros.tools.fit_decay",
     "compare_decays": "limit_surface_ros.tools.compare_decays",
     "plot_decay": "limit_surface_ros.tools.plot_decay",
+    "plot_push": "limit_surface_ros.tools.plot_push",
     "plot_slide": "limit_surface_ros.tools.plot_slide",
+    "plot_surface": "limit_surface_ros.tools.plot_surface",
+    "reproduce_thesis": "limit_surface_ros.tools.reproduce_thesis",
+    "ask": "limit_surface_ros.nodes.ask",
+    "demo": "limit_surface_ros.nodes.demo",
+    "limit_surface_node": "limit_surface_ros.nodes.limit_surface_node",
+    "decay_node": "limit_surface_ros.nodes.decay_node",
+    "force_motion_nodes": "limit_surface_ros.nodes.force_motion_nodes",
+}
+
+
+def installed_files(folder: str) -> list[tuple[str, list[str]]]:
+    """Return data_files entries that install `folder` and the folders in it under share/."""
+    files = sorted(path for path in Path(folder).rglob("*") if path.is_file())
+    places = sorted({path.parent for path in files})
+    return [
+        (f"share/{PACKAGE}/{place}", [str(path) for path in files if path.parent == place])
+        for place in places
+    ]
+
+
+setup(
+    name=PACKAGE,
+    version="0.1.0",
+    description="Limit surfaces of sliding bodies and decay models, fitted and served over ROS 2",
+    license="Apache-2.0",
+    maintainer="limit_surface_ros maintainers",
+    maintainer_email="maintainers@users.noreply.github.com",
+    packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
+    package_data={PACKAGE: ["py.typed"], f"{PACKAGE}.export": ["templates/*"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
+        (f"share/{PACKAGE}", ["package.xml"]),
+        *installed_files("config"),
+        *installed_files("launch"),
+    ],
+    python_requires=">=3.10",
+    install_requires=["numpy>=1.26,<3", "scipy>=1.11,<2", "pyyaml>=6,<7"],
+    extras_require=EXTRAS,
+    zip_safe=False,
+    entry_points={
+        # Not the modules themselves: Ctrl-C would end their imports with a traceback.
+        "console_scripts": [
+            f"{name} = {PACKAGE}.runtime:{module.removeprefix(f'{PACKAGE}.')}"
+            for name, module in PROGRAMS.items()
+        ],
+    },
+)
