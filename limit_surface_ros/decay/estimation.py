@@ -45,7 +45,7 @@ CREDIBLE = 12.0
 # Tests of the residuals: so many deviations are too many, from so many samples on.
 MOST_DEVIATIONS, LEAST_TESTED = 4.0, 8
 # Deviations in a bound, and the last samples that a bound is not below if nothing fits.
-BOUND_DEVIATIONS, LAST_SAMPLES = 3.0, 20
+BOUND_DEVIATIONS, LAST_SAMPLES = 3.5, 20
 # Residuals before a sample that show whether it stands alone.
 NEIGHBOURS = 5
 
@@ -302,7 +302,7 @@ class ResponseEstimator:
     def bounds(self, times: Floats) -> Floats:
         """Return what the response is expected to differ from `learnt` by at most, shape (n,).
 
-        Three standard deviations of the mixture of all families, and the distance to each that
+        Three and a half standard deviations of the mixture of all families, and the distance to each that
         is credible; where nothing fits, at least the largest of the last samples.
         """
         centre = self.learnt(times)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 # and of coefficients over |m(0)| and the largest.
 AMPLITUDE_SPREAD, RATE_SPREAD, DELAY_SPREAD, DECAY_SPREAD, WEIGHT_SPREAD = 3.0, 0.7, 0.3, 0.7, 0.5
 # The jump of the slope may be so many deviations of the delay away.
-DELAY_REACH = 3.0
+DELAY_REACH = 3.5
 # log s stays within these.
 MOST_RATE_CHANGE = 3.0
 

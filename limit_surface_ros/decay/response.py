@@ -119,7 +119,7 @@ class Response:
     def bounds(self, times: ArrayLike) -> Floats:
         """Return the largest error that is to be expected at given times, in the unit of x.
 
-        What is stated of the model, and after corrections three standard deviations of the
+        What is stated of the model, and after corrections 3.5 standard deviations of the
         estimate, and the distance to other families that measurements do not rule out. Infinite
         where nothing is known: where nothing is stated, and where the model itself does not fit,
         after `span_factor` times the time that was seen.
