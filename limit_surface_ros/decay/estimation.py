@@ -302,7 +302,7 @@ class ResponseEstimator:
     def bounds(self, times: Floats) -> Floats:
         """Return what the response is expected to differ from `learnt` by at most, shape (n,).
 
-        Three and a half standard deviations of the mixture of all families, and the distance to each that
+        3.5 standard deviations of the mixture of all families, and the distance to each that
         is credible; where nothing fits, at least the largest of the last samples.
         """
         centre = self.learnt(times)
