@@ -35,7 +35,7 @@ def read_mesh(path: str | Path) -> Floats:
     content = read_bytes(path, MOST_BYTES, "a mesh")
     try:
         triangles = _of_obj(content) if suffix == ".obj" else _of_stl(content)
-    except (ValueError, IndexError) as error:
+    except (ValueError, IndexError, OverflowError) as error:
         raise FileError(f"{path}: is no valid {suffix} file: {error}") from None
     if not len(triangles):
         raise FileError(f"{path}: holds no triangle")

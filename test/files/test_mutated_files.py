@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from limit_surface_ros.errors import LimitSurfaceError, MissingExtraError
+from limit_surface_ros.files.bag_pushes import read_bag_pushes
 from limit_surface_ros.files.body_file import read_body
 from limit_surface_ros.files.contact_file import read_contact
 from limit_surface_ros.files.decay_file import read_decay_model
@@ -148,7 +149,21 @@ def stl_samples(_: Path) -> list[bytes]:
     return [STL.encode(), bytes(80) + (2).to_bytes(4, "little") + records]
 
 
+def bag_samples(folder: Path, storage: str) -> list[bytes]:
+    pytest.importorskip("rosbags", reason="the extra 'bags' is not installed")
+    from bag_helpers import TIMES, StoragePlugin, steady_push, write_bag
+
+    bag = write_bag(folder / "bag", steady_push(TIMES[:60]), getattr(StoragePlugin, storage))
+    return [path.read_bytes() for path in bag.iterdir() if path.suffix != ".yaml"]
+
+
+def read_bag(path: Path) -> object:
+    return read_bag_pushes(path, "/load", "/motion")
+
+
 READERS = {
+    "db3": Reader(read_bag, ".db3", lambda folder: bag_samples(folder, "SQLITE3"), 40),
+    "mcap": Reader(read_bag, ".mcap", lambda folder: bag_samples(folder, "MCAP"), 40),
     "surface": Reader(read_surface_model, ".yaml", surface_samples, 60),
     "decay": Reader(
         read_decay_model,
