@@ -30,7 +30,7 @@ _SECTION_POINTS = 721
 _MERIDIANS, _PARALLELS = 97, 65
 _MOST_DOTS = 1500
 # By the number of surfaces in one picture.
-_ZOOM = {1: 1.15, 2: 0.98, 3: 0.92, 4: 0.9}
+_ZOOM = {1: 1.0, 2: 0.98, 3: 0.92, 4: 0.9}
 # Where the viewer stands and where the light comes from [deg].
 _AZIMUTH, _ELEVATION = -55.0, 24.0
 _LIGHT = (-80.0, 45.0)
@@ -157,16 +157,26 @@ def style_solid(axes: Axes3D, extent: Floats, zoom: float = 0.9) -> None:
     limits: dict[str, Any] = {
         f"{name}lim": (-1.02 * half, 1.02 * half) for name, half in zip("xyz", extent, strict=True)
     }
+    # Few ticks, away from the corners, where those of two axes would meet.
     axes.set(**limits)
-    axes.set_xlabel(LOAD_LABELS[0], labelpad=-2)
-    axes.set_ylabel(LOAD_LABELS[1], labelpad=-2)
-    axes.set_zlabel(LOAD_LABELS[2], labelpad=2)
+    for axis, half in zip((axes.xaxis, axes.yaxis, axes.zaxis), extent, strict=True):
+        tick = _tick(float(half))
+        axis.set_ticks([-tick, 0.0, tick], labels=[f"\N{MINUS SIGN}{tick:g}", "0", f"{tick:g}"])
+    axes.set_xlabel(LOAD_LABELS[0], labelpad=-4)
+    axes.set_ylabel(LOAD_LABELS[1], labelpad=-4)
+    # Beside its axis the label would leave a narrow panel; above its end there is room.
+    axes.text2D(0.99, 0.86, LOAD_LABELS[2], transform=axes.transAxes, ha="right", fontsize=9)
     axes.tick_params(labelsize=7, pad=-2)
-    axes.tick_params(axis="z", pad=2)
-    for name in "xyz":
-        axes.locator_params(axis=name, nbins=4)
+    axes.tick_params(axis="z", pad=1)
     axes.set_box_aspect((1.0, 1.0, 0.85), zoom=zoom)
     axes.view_init(elev=_ELEVATION, azim=_AZIMUTH)
+
+
+def _tick(half: float) -> float:
+    """Return the largest of 1, 2 and 5 times a power of ten that is well below a limit."""
+    most = 0.75 * half
+    power = 10.0 ** np.floor(np.log10(most))
+    return float(max(round(step * power, 12) for step in (1, 2, 5) if step * power <= most))
 
 
 def draw_surfaces(surfaces: Mapping[str, LimitSurface], loads: Floats | None = None) -> Figure:

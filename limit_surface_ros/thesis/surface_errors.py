@@ -17,6 +17,7 @@ from limit_surface_ros.plots.canvas import (
     VERMILION,
     new_figure,
 )
+from limit_surface_ros.plots.distributions import draw_distribution, frame_distributions
 from limit_surface_ros.surface.convexity import is_convex
 from limit_surface_ros.surface.measures import (
     empirical_distribution,
@@ -250,12 +251,13 @@ def draw_errors(errors: Errors) -> Figure:
 
 
 def _draw(axes: Axes, errors: Mapping[Fit, Floats], label: str) -> None:
-    for fit, values in errors.items():
-        sizes, shares = empirical_distribution(values)
-        dashes = ":" if fit.family == PEER else _DASHES[fit.objective]
-        axes.plot(sizes, 100.0 * shares, dashes, color=_COLOURS[fit.family], label=fit.label)
     # The last percent may be far out and would squeeze the rest.
-    axes.set(xlabel=label, ylim=(0.0, 101.0), xlim=(0.0, _reach(errors)))
+    end = 1.05 * max(float(np.quantile(values, 0.99)) for values in errors.values())
+    for fit, values in errors.items():
+        dashes = ":" if fit.family == PEER else _DASHES[fit.objective]
+        style = {"color": _COLOURS[fit.family], "linestyle": dashes, "label": fit.label}
+        draw_distribution(axes, values, end, **style)
+    frame_distributions(axes, label, end)
 
 
 def _convexity(*groups: Errors) -> str:
@@ -265,10 +267,6 @@ def _convexity(*groups: Errors) -> str:
         return "All fits are convex."
     shares = ", ".join(f"{label} {100.0 * share:.1f} %" for label, share in dented.items())
     return f"Not convex, in this share of the directions of load: {shares}. All others are convex."
-
-
-def _reach(errors: Mapping[Fit, Floats]) -> float:
-    return 1.1 * float(np.median([values[-1] for values in errors.values()]))
 
 
 def _common_claims(body: str, errors: Errors) -> tuple[Claim, ...]:
