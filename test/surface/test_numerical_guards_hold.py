@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The places where a solver without its guards would answer wrong, and nothing would say so."""
+
+import numpy as np
+import pytest
+
+from limit_surface_ros.errors import RangeError
+from limit_surface_ros.surface import sampling
+from limit_surface_ros.surface.convexity import is_convex
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+from limit_surface_ros.surface.kinds.polynomial import Polynomial
+from limit_surface_ros.surface.kinds.power_sum import PowerSum
+from limit_surface_ros.surface.linalg import even_directions, null_space, root_of
+from limit_surface_ros.surface.scaling import Scaling
+
+
+def most_power(surface, twists, probes):
+    """The power of wrench_of_twist, one by one and all at once, over that of the best probe."""
+    probes = probes / surface.load_factor(probes)[:, np.newaxis]
+    best = np.abs(twists @ probes.T).max(axis=1)
+    alone = np.array([surface.wrench_of_twist(twist) for twist in twists])
+    return [
+        (loads * twists).sum(axis=1) / best for loads in (alone, surface.wrench_of_twist(twists))
+    ]
+
+
+@pytest.mark.parametrize("exponent", [0.2, 0.35, 0.5])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_spike_is_the_answer_where_nothing_beats_it(exponent, seed):
+    rng = np.random.default_rng(seed)
+    root = rng.standard_normal((2, 3))
+    spike = np.cross(root[0], root[1])
+    surface = PowerSum([np.eye(3), 4.0 * root.T @ root], [1.0, exponent])
+    twists = sampling.random_directions(60, seed)
+    for share in most_power(surface, twists, np.array([spike, *even_directions(3000)])):
+        assert (share >= 1.0 - 1e-9).all()
+    # Along the spike itself the answer is its point, not one beside it.
+    point = spike / surface.load_factor(spike)
+    np.testing.assert_allclose(surface.wrench_of_twist(spike), point, atol=1e-9)
+
+
+@pytest.mark.parametrize("exponent", [0.2, 0.35])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_crease_is_the_answer_where_nothing_beats_it(exponent, seed):
+    rng = np.random.default_rng(seed)
+    normal = rng.standard_normal(3)
+    plane = np.linalg.svd(normal[np.newaxis])[2][1:]
+    angle = np.linspace(0.0, np.pi, 2000)
+    crease = np.outer(np.cos(angle), plane[0]) + np.outer(np.sin(angle), plane[1])
+    surface = PowerSum([np.eye(3), 4.0 * np.outer(normal, normal)], [1.0, exponent])
+    twists = sampling.random_directions(60, seed)
+    for share in most_power(surface, twists, crease):
+        assert (share >= 1.0 - 1e-9).all()
+
+
+def test_a_polynomial_with_dents_is_not_taken_as_convex():
+    # x^4 + y^4 + m^4 + 9 (x^2 y^2 + y^2 m^2) + ...: several sheets serve one twist.
+    surface = Polynomial([1, 0, 0, 9, 0, 1, 0, 0, 0, 0, 8, 0, 9, 0, 1])
+    twists = sampling.random_directions(300, 0)
+    for share in most_power(surface, twists, even_directions(20_000)):
+        assert (share >= 1.0 - 1e-9).all()
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0), (0.3, -0.2), (5.0, 40.0)])
+def test_only_a_load_with_a_moment_about_the_one_support_turns_the_body(place):
+    surface = PointContacts([place], [2.0], Scaling(0.05, 1.0))
+    x, y = place
+    rng = np.random.default_rng(0)
+    forces = rng.standard_normal((300, 2))
+    through = np.column_stack([forces, x * forces[:, 1] - y * forces[:, 0]])
+    expected = np.linalg.norm(forces, axis=1) / 2.0
+    np.testing.assert_allclose(surface.load_factor(through), expected, rtol=1e-12)
+    alone = [surface.load_factor(load) for load in through[:40]]
+    np.testing.assert_allclose(alone, expected[:40], rtol=1e-12)
+    beside = through + np.array([0.0, 0.0, 1e-6])
+    assert np.isinf(surface.load_factor(beside)).all()
+    turning = np.array([y, -x, 1.0])
+    turning /= np.linalg.norm(turning / surface.scaling.twist_unit)
+    np.testing.assert_allclose(surface.twist_of_wrench(beside), [turning] * 300, atol=1e-9)
+
+
+def test_only_a_twist_along_an_unlimited_load_has_infinite_power():
+    free = np.array([1.0, 2.0, -3.0]) / np.sqrt(14.0)
+    surface = PowerSum([np.eye(3) - np.outer(free, free)] * 2, [1.0, 0.5])
+    across = np.cross(free, np.random.default_rng(0).standard_normal((100, 3)))
+    wrenches = surface.wrench_of_twist(across)
+    np.testing.assert_allclose(surface.load_factor(wrenches), 1.0, rtol=1e-12)
+    np.testing.assert_allclose(wrenches @ free, 0.0, atol=1e-12)
+    with pytest.raises(RangeError, match="infinite"):
+        surface.wrench_of_twist(across + 1e-9 * free)
+
+
+def test_a_flat_place_is_no_dent_and_a_shallow_dent_is_one():
+    # x^4 + y^4 + m^4 has no curvature at its axes; a little x^2 y^2 less makes none either.
+    flat = np.array([1.0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1])
+    assert is_convex(Polynomial(flat)).convex
+    dented = flat.copy()
+    dented[3] = -1e-3
+    convexity = is_convex(Polynomial(dented))
+    assert not convexity.convex
+    assert convexity.dented_share < 0.05
+
+
+@pytest.mark.parametrize("count", [30, 250])
+def test_a_motion_close_by_a_support_point_is_found_among_many(count):
+    rng = np.random.default_rng(count)
+    points = rng.uniform(-0.05, 0.05, (count, 2))
+    surface = PointContacts(points, rng.uniform(0.5, 1.5, count) / count, Scaling(0.05, 1.0))
+    which = rng.integers(0, count, 150)
+    # From far beyond a facet's rim down to the support point itself.
+    away = 10.0 ** rng.uniform(-9, -2, (150, 1)) * rng.standard_normal((150, 2))
+    away[:20] = 0.0
+    x, y = (points[which] + 0.01 * away).T
+    twists = np.column_stack([y, -x, np.ones(150)]) * rng.choice([-1.0, 1.0], (150, 1))
+    found = surface.twist_of_wrench(surface.wrench_of_twist(twists))
+    found /= np.abs(found[:, 2:])
+    np.testing.assert_allclose(found, twists, atol=2e-9)
+
+
+def test_the_root_of_a_form_keeps_what_is_small_beside_other_units():
+    root = np.array([[1.0, 0.2, 1e-9], [0.0, 1.0, -3e-10], [0.0, 0.0, 2e-10]])
+    found = root_of(root.T @ root)
+    assert np.abs(found).any(axis=1).all()
+    np.testing.assert_allclose(np.abs(np.linalg.det(found)), 2e-10, rtol=1e-6)
+    assert len(null_space(found[np.newaxis])) == 0
+    assert len(null_space(np.array([root_of(np.diag([1.0, 1e-18, 0.0]))]))) == 1
+
+
+def test_norms_that_share_a_null_space_are_no_corner_of_one():
+    # Two support points in one place are one; as matrices they stay two terms.
+    form = np.array([[1.0, 0, 0], [0, 1.0, 0], [0, 0, 0]])
+    third = np.array([[1.0, 0, -0.5], [0, 1.0, 0.8], [-0.5, 0.8, 0.89]])
+    twice = Dissipation([form, form, third])
+    once = Dissipation([4.0 * form, third])
+    loads = sampling.random_directions(400, 0)
+    np.testing.assert_allclose(twice.load_factor(loads), once.load_factor(loads), rtol=1e-8)
