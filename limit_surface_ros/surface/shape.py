@@ -77,7 +77,7 @@ class Shape(ABC):
 
 
 class GaugeShape(Shape):
-    """A shape whose load factor is in closed form; loads of most power are searched for.
+    """A shape whose load factor is in closed form; loads of maximum dissipation are searched for.
 
     Args:
         gauge: The load factor.
@@ -92,7 +92,7 @@ class GaugeShape(Shape):
     @property
     @abstractmethod
     def solver(self) -> SupportSolver:
-        """Finds the loads of most power."""
+        """Finds the loads of maximum dissipation."""
 
     @property
     def gauge(self) -> Gauge:
@@ -113,7 +113,7 @@ class GaugeShape(Shape):
         return of_unit_length(normals), factors
 
     def loads(self, motions: Floats) -> Floats:
-        """Return the loads of most power; see `Shape`."""
+        """Return the loads of maximum dissipation; see `Shape`."""
         return self.solver.solve(motions)[0]
 
     def load_factor_scalar(self, load: Vector) -> float | None:
@@ -125,7 +125,7 @@ class GaugeShape(Shape):
         return self._scalar.value_and_normal(load)
 
     def load_scalar(self, motion: Vector) -> Vector | None:
-        """Return the load of most power for one motion; see `Shape`."""
+        """Return the load of maximum dissipation for one motion; see `Shape`."""
         return self.solver.solve_scalar(motion)
 
     def expect(self, count: float) -> None:
@@ -136,8 +136,8 @@ class GaugeShape(Shape):
 class DissipationShape(Shape):
     """A shape whose dissipation is in closed form; the motions of loads are searched for.
 
-    The load of most power is the gradient of D; at a kink, where the motion belongs to a facet, it
-    is the facet's centre.
+    The load of maximum dissipation is the gradient of D; at a kink, where the motion belongs to a
+    facet, it is the facet's centre.
 
     Args:
         dissipation: D, the support function of the set of loads, as a gauge of motions.
@@ -155,11 +155,11 @@ class DissipationShape(Shape):
         """Finds the motions of D = 1 with the most power: that power is the load factor."""
 
     def loads(self, motions: Floats) -> Floats:
-        """Return the loads of most power; see `Shape`."""
+        """Return the loads of maximum dissipation; see `Shape`."""
         return self.dissipation.values_and_normals(motions)[1]
 
     def load_scalar(self, motion: Vector) -> Vector | None:
-        """Return the load of most power for one motion; see `Shape`."""
+        """Return the load of maximum dissipation for one motion; see `Shape`."""
         found = None if self._scalar is None else self._scalar.value_and_normal(motion)
         return None if found is None else found[1]
 

@@ -97,7 +97,7 @@ class PowerSumGauge:
         return np.asarray(np.linalg.inv(np.moveaxis(self._tangent_forms(loads), 2, 0)))
 
     def along_ellipsoids(self, loads: Floats, normals: Floats) -> Floats:
-        """Return P n (3, m), along the load of most power n.f on each of `ellipsoids`."""
+        """Return P n (3, m), along the load of maximum dissipation n.f on each of `ellipsoids`."""
         return solve_symmetric(self._tangent_forms(loads), normals)
 
     def _tangent_forms(self, loads: Floats) -> Floats:

@@ -107,7 +107,7 @@ class _QuarticShape(GaugeShape):
 
     @cached_property
     def solver(self) -> SupportSolver:
-        """Finds the loads of most power."""
+        """Finds the loads of maximum dissipation."""
         frame = round_frame(self._quartic)
         quartic = self._quartic.in_frame(frame)
         scalar = QuarticScalar(quartic.first, quartic.second)

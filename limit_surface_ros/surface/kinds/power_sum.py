@@ -198,7 +198,7 @@ class _PowerSumShape(GaugeShape):
         return found if found is not None and found[0] > 0.0 else None
 
     def loads(self, motions: Floats) -> Floats:
-        """Return the loads of most power; see `Shape`.
+        """Return the loads of maximum dissipation; see `Shape`.
 
         Raises:
             RangeError: The power of a motion is infinite.
@@ -214,7 +214,7 @@ class _PowerSumShape(GaugeShape):
         return super().loads(motions)
 
     def load_scalar(self, motion: Vector) -> Vector | None:
-        """Return the load of most power for one motion; see `Shape`."""
+        """Return the load of maximum dissipation for one motion; see `Shape`."""
         return None if len(self._free) else super().load_scalar(motion)
 
     @cached_property
@@ -225,7 +225,7 @@ class _PowerSumShape(GaugeShape):
 
     @cached_property
     def solver(self) -> SupportSolver:
-        """Finds the loads of most power."""
+        """Finds the loads of maximum dissipation."""
         roots = self._roots
         if len(self._free):
             # A limit within one term keeps the answer at zero along what nothing limits.

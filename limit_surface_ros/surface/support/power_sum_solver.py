@@ -53,7 +53,7 @@ def scalar_gauge_of(roots: Floats, exponents: Floats) -> ScalarGauge:
 
 
 def power_sum_solver(roots: Floats, exponents: Floats) -> SupportSolver:
-    """Return the solver for the loads of most power on sum_i |R_i f|^(2 p_i) = 1.
+    """Return the solver for the loads of maximum dissipation on sum_i |R_i f|^(2 p_i) = 1.
 
     Args:
         roots: R_i, of which some rise with any load, shape (k, 3, 3).

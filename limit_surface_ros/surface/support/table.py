@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The support function of a surface as a table, from which points of most power are read.
+"""The support function of a surface as a table, from which support points are read.
 
 The power of the best point, D(n) = max n.x over a surface, is a gauge itself, with the point as
 its gradient. A table of quintic polynomials holds D on half the sphere, and a point read from it
-is almost right. The surface's own gradient there tells the normal for which it is *exactly* right,
-and from that normal to the wanted one it is so short a way that the table's curvature leads along
-it. What such a step leaves is known of each cell of the table; after a longer one than that allows
-another gradient tells what is left.
+is almost right. The gauge's gradient there is the normal for which it is *exactly* right; from
+that normal to the wanted one a step along the table's curvature leads. How much error a step
+leaves is measured for each cell when the table is made; after a longer step than that allows,
+another gradient measures it.
 
-A surface that bends inward may have several points with the wanted normal, and a gradient does not
-tell the best. There a cell of the table is read only if one sheet of the surface serves all of it.
+A surface that is not convex may have several points with the wanted normal, and a gradient does
+not say which is the best. There a cell is read only if one sheet of the surface serves all of it.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _CELLS = 80
 _DEGREE = 5
 _POWERS = [(i, j) for i in range(_DEGREE + 1) for j in range(_DEGREE + 1 - i)]
 _PLANE = [_POWERS.index(powers) for powers in ((0, 0), (1, 0), (0, 1))]
-# Derivatives along x and y of what is read: the height, its slopes and its bends.
+# Derivatives along x and y of what is read: the height, its slopes and its second derivatives.
 _ORDERS = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
 # Vectors for which one is solved to make a table.
 SAMPLES = (2 * _CELLS + 1) ** 2
@@ -173,11 +173,11 @@ class SupportTable:
         points = points / values
         away = place - _chart(normals)
         # Moves are short: the digits that single precision keeps of them are enough.
-        a, b, lift, bend_aa, bend_ab, bend_bb = local
+        a, b, lift, h_aa, h_ab, h_bb = local
         da, db = away.astype(np.float32)
         z = points[2].astype(np.float32)
-        rise_a = bend_aa * da + bend_ab * db
-        rise_b = bend_ab * da + bend_bb * db
+        rise_a = h_aa * da + h_ab * db
+        rise_b = h_ab * da + h_bb * db
         rise = a * rise_a + b * rise_b + z * (a * da + b * db)
         rise *= -lift
         points[0] += rise_a + a * rise + z * da
@@ -196,14 +196,14 @@ class SupportTable:
             within: The places within these, from -1 to 1, shape (2, m).
         """
         local: Any = np.empty((6, len(cell)), dtype=np.float32)
-        bent, local[3:] = self._derivatives(cell, within)
+        rest, local[3:] = self._derivatives(cell, within)
         height, slope_a, slope_b = self._planes.take(cell, axis=1)
         (x, y), (a, b) = within, place
         height += slope_a * x
         height += slope_b * y
-        height += bent[0]
-        slope_a += bent[1]
-        slope_b += bent[2]
+        height += rest[0]
+        slope_a += rest[1]
+        slope_b += rest[2]
         slope_a *= _CELLS
         slope_b *= _CELLS
         lift = 2.0 / (1.0 + a * a + b * b)
@@ -217,9 +217,9 @@ class SupportTable:
         return points, local
 
     def _derivatives(self, cell: Places, within: Floats) -> tuple[Any, Any]:
-        """Return what bends at places within cells: h, h_a, h_b (3, m), h_aa, h_ab, h_bb (3, m).
+        """Return h, h_a, h_b (3, m) less a plane, and h_aa, h_ab, h_bb (3, m) within cells.
 
-        The first three are what is beyond the plane in the cell's middle, in its own units.
+        The plane is that in the cell's middle; these three are in the cell's own units.
         A polynomial that holds its own derivatives at the middle of the cell has those elsewhere
         as sums of the same products, but of later coefficients.
         """
