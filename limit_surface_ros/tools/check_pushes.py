@@ -18,16 +18,16 @@ from limit_surface_ros.fitting.pairs import scaling_of_pairs
 from limit_surface_ros.fitting.plausibility import doubts_of_pairs, lengths_of
 from limit_surface_ros.plots.canvas import DPI, SUFFIXES, save_figure
 from limit_surface_ros.plots.pushes_view import draw_pushes
-from limit_surface_ros.tools.bag_options import (
+from limit_surface_ros.tools.common.bag_options import (
     OF_BAGS,
     add_bag_options,
     corrections_in_words,
     pushes_of_bag,
 )
-from limit_surface_ros.tools.csv_options import OF_CELLS, add_cell_options, cell_options
-from limit_surface_ros.tools.options import check_output, named_path, refuse_unused
-from limit_surface_ros.tools.program import run_program
-from limit_surface_ros.tools.training_data import BAG, PUSHES, check_input
+from limit_surface_ros.tools.common.csv_options import OF_CELLS, add_cell_options, cell_options
+from limit_surface_ros.tools.common.options import check_output, named_path, refuse_unused
+from limit_surface_ros.tools.common.program import run_program
+from limit_surface_ros.tools.common.training_data import BAG, PUSHES, check_input
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING
 
 from limit_surface_ros.decay.fit import METHODS, fit_decay
 from limit_surface_ros.errors import LimitSurfaceError, RangeError
-from limit_surface_ros.tools.decay_input import add_input_options, read_input
+from limit_surface_ros.tools.common.decay_input import add_input_options, read_input
+from limit_surface_ros.tools.common.program import program_parser, progress_bar, run_program
 from limit_surface_ros.tools.fit_decay import add_method_options, beyond, method_options
-from limit_surface_ros.tools.program import program_parser, progress_bar, run_program
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from limit_surface_ros.decay.fit import Options
-    from limit_surface_ros.tools.decay_input import DecayInput
+    from limit_surface_ros.tools.common.decay_input import DecayInput
 
 EXAMPLES = """examples:
   compare_decays f1 --end 19

@@ -31,11 +31,11 @@ from limit_surface_ros.fitting.workers import available_cores
 from limit_surface_ros.plots.canvas import SUFFIXES, new_figure, save_figure
 from limit_surface_ros.plots.distributions import draw_distributions
 from limit_surface_ros.surface.measures import load_error, quantiles, velocity_error
-from limit_surface_ros.tools.fit_options import OF_AUTO
-from limit_surface_ros.tools.options import check_output, named_path, refuse_unused
-from limit_surface_ros.tools.program import program_parser, progress_bar, run_program
-from limit_surface_ros.tools.same_point import About, require_one_point
-from limit_surface_ros.tools.surface_fit import (
+from limit_surface_ros.tools.common.fit_options import OF_AUTO
+from limit_surface_ros.tools.common.options import check_output, named_path, refuse_unused
+from limit_surface_ros.tools.common.program import program_parser, progress_bar, run_program
+from limit_surface_ros.tools.common.same_point import About, require_one_point
+from limit_surface_ros.tools.common.surface_fit import (
     RANGES,
     add_fit_options,
     check_fit_options,
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from limit_surface_ros.files.surface_file import SurfaceModel
     from limit_surface_ros.surface.base import LimitSurface
     from limit_surface_ros.surface.pairs import Pairs
-    from limit_surface_ros.tools.training_data import TrainingData
+    from limit_surface_ros.tools.common.training_data import TrainingData
 
 EXAMPLES = """examples:
   compare_surfaces contact.yaml --models a.yaml b.yaml

@@ -12,9 +12,9 @@ from limit_surface_ros.errors import DataError
 from limit_surface_ros.export.explorer import MOST_MODELS, explorer_page
 from limit_surface_ros.files.atomic_write import write_atomically
 from limit_surface_ros.files.surface_file import read_surface_model
-from limit_surface_ros.tools.options import check_output
-from limit_surface_ros.tools.program import program_parser, run_program
-from limit_surface_ros.tools.same_point import About, require_one_point
+from limit_surface_ros.tools.common.options import check_output
+from limit_surface_ros.tools.common.program import program_parser, run_program
+from limit_surface_ros.tools.common.same_point import About, require_one_point
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from limit_surface_ros.export.targets import SUFFIXES, export_surface
 from limit_surface_ros.files.atomic_write import write_atomically
 from limit_surface_ros.files.surface_file import read_surface_model
-from limit_surface_ros.tools.options import check_output
-from limit_surface_ros.tools.program import program_parser, run_program
+from limit_surface_ros.tools.common.options import check_output
+from limit_surface_ros.tools.common.program import program_parser, run_program
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -28,17 +28,26 @@ from limit_surface_ros.files.surface_file import read_surface_model, write_surfa
 from limit_surface_ros.fitting.catalogue import Outcome, outcomes
 from limit_surface_ros.fitting.workers import available_cores, worker_processes
 from limit_surface_ros.surface.convexity import NotConvexWarning
-from limit_surface_ros.tools.executors import CLUSTER_IN_FLIGHT, check_address, dask_executor
-from limit_surface_ros.tools.fit_options import refuse_options_of_others
-from limit_surface_ros.tools.options import refuse_empty
-from limit_surface_ros.tools.program import FAILED, program_parser, progress_bar, run_program
-from limit_surface_ros.tools.surface_fit import (
+from limit_surface_ros.tools.common.executors import (
+    CLUSTER_IN_FLIGHT,
+    check_address,
+    dask_executor,
+)
+from limit_surface_ros.tools.common.fit_options import refuse_options_of_others
+from limit_surface_ros.tools.common.options import refuse_empty
+from limit_surface_ros.tools.common.program import (
+    FAILED,
+    program_parser,
+    progress_bar,
+    run_program,
+)
+from limit_surface_ros.tools.common.surface_fit import (
     add_fit_options,
     add_frame_option,
     check_fit_options,
     fit_model,
 )
-from limit_surface_ros.tools.training_data import (
+from limit_surface_ros.tools.common.training_data import (
     ACCEPTED,
     SUFFIXES,
     is_bag,

@@ -28,20 +28,20 @@ from limit_surface_ros.decay.targets import PiecewiseLinear, Record
 from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.decay_file import DecayModel, write_decay_model
 from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
-from limit_surface_ros.tools.csv_options import OF_RESPONSES
-from limit_surface_ros.tools.decay_input import add_input_options, read_input
-from limit_surface_ros.tools.delay_report import system_in_words
-from limit_surface_ros.tools.options import check_output, refuse_empty, refuse_unused
-from limit_surface_ros.tools.program import program_parser, run_program
-from limit_surface_ros.tools.training_data import is_bag
+from limit_surface_ros.tools.common.csv_options import OF_RESPONSES
+from limit_surface_ros.tools.common.decay_input import add_input_options, read_input
+from limit_surface_ros.tools.common.delay_report import system_in_words
+from limit_surface_ros.tools.common.options import check_output, refuse_empty, refuse_unused
+from limit_surface_ros.tools.common.program import program_parser, run_program
+from limit_surface_ros.tools.common.training_data import is_bag
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from limit_surface_ros.decay.certify import LargestError
     from limit_surface_ros.decay.fit import DecayFit
-    from limit_surface_ros.tools.csv_options import OF_RESPONSES
-from limit_surface_ros.tools.decay_input import DecayInput
+    from limit_surface_ros.tools.common.csv_options import OF_RESPONSES
+from limit_surface_ros.tools.common.decay_input import DecayInput
 
 EXAMPLES = """methods:
   dde       characteristic roots of the response's own delay system (the thesis); its maximum

@@ -17,22 +17,22 @@ from limit_surface_ros.files.surface_file import write_surface_model
 from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
 from limit_surface_ros.fitting.search import AGREEMENT, process_pool
 from limit_surface_ros.fitting.workers import available_cores
-from limit_surface_ros.tools.fit_options import refuse_options_of_others
-from limit_surface_ros.tools.options import check_output, named_path, refuse_empty
-from limit_surface_ros.tools.program import program_parser, progress_bar, run_program
-from limit_surface_ros.tools.surface_fit import (
+from limit_surface_ros.tools.common.fit_options import refuse_options_of_others
+from limit_surface_ros.tools.common.options import check_output, named_path, refuse_empty
+from limit_surface_ros.tools.common.program import program_parser, progress_bar, run_program
+from limit_surface_ros.tools.common.surface_fit import (
     add_fit_options,
     add_frame_option,
     check_fit_options,
     fit_model,
 )
-from limit_surface_ros.tools.training_data import ACCEPTED, check_input
+from limit_surface_ros.tools.common.training_data import ACCEPTED, check_input
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from limit_surface_ros.fitting.result import Errors, FitResult
-    from limit_surface_ros.tools.surface_fit import FittedModel
+    from limit_surface_ros.tools.common.surface_fit import FittedModel
 
 EXAMPLES = """examples:
   fit_surface contact.yaml --terms 3 --output model.yaml

@@ -13,10 +13,10 @@ from limit_surface_ros.errors import FileError
 from limit_surface_ros.files.decay_file import read_decay_model
 from limit_surface_ros.plots.canvas import save_figure
 from limit_surface_ros.plots.decay_view import PROJECTION, draw_decay
-from limit_surface_ros.tools.csv_options import add_response_options, response_of_csv
-from limit_surface_ros.tools.decay_input import after, without
-from limit_surface_ros.tools.options import add_picture_options, check_picture
-from limit_surface_ros.tools.program import program_parser, run_program
+from limit_surface_ros.tools.common.csv_options import add_response_options, response_of_csv
+from limit_surface_ros.tools.common.decay_input import after, without
+from limit_surface_ros.tools.common.options import add_picture_options, check_picture
+from limit_surface_ros.tools.common.program import program_parser, run_program
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -18,13 +18,13 @@ from limit_surface_ros.files.yaml_reader import read_yaml
 from limit_surface_ros.motion.rollout import DEFAULT_ACCURACY, OVERLAPS, simulate_push
 from limit_surface_ros.plots.canvas import save_figure
 from limit_surface_ros.plots.push_view import FILMS, draw_push, write_film
-from limit_surface_ros.tools.options import (
+from limit_surface_ros.tools.common.options import (
     add_picture_options,
     check_output,
     check_picture,
     check_ranges,
 )
-from limit_surface_ros.tools.program import run_program
+from limit_surface_ros.tools.common.program import run_program
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -21,14 +21,14 @@ from limit_surface_ros.motion.sliding.slide import slide_body, stop_bracket
 from limit_surface_ros.plots.canvas import save_figure
 from limit_surface_ros.plots.film import FILMS
 from limit_surface_ros.plots.slide_view import draw_slide, write_slide_film
-from limit_surface_ros.tools.options import (
+from limit_surface_ros.tools.common.options import (
     add_picture_options,
     check_output,
     check_picture,
     check_ranges,
     refuse_unused,
 )
-from limit_surface_ros.tools.program import run_program
+from limit_surface_ros.tools.common.program import run_program
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

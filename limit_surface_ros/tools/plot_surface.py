@@ -18,10 +18,10 @@ from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
 from limit_surface_ros.plots.canvas import save_figure
 from limit_surface_ros.plots.surface_view import draw_surfaces
 from limit_surface_ros.surface.sampling import facet_loads, random_motions
-from limit_surface_ros.tools.csv_options import add_cell_options, cell_options
-from limit_surface_ros.tools.options import add_picture_options, check_picture
-from limit_surface_ros.tools.program import program_parser, run_program
-from limit_surface_ros.tools.same_point import About, require_one_point
+from limit_surface_ros.tools.common.csv_options import add_cell_options, cell_options
+from limit_surface_ros.tools.common.options import add_picture_options, check_picture
+from limit_surface_ros.tools.common.program import program_parser, run_program
+from limit_surface_ros.tools.common.same_point import About, require_one_point
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -16,7 +16,7 @@ from limit_surface_ros.thesis.run import carry_out
 from limit_surface_ros.thesis.settings import FULL, QUICK
 from limit_surface_ros.thesis.store import Store
 from limit_surface_ros.thesis.studies import STUDIES
-from limit_surface_ros.tools.program import program_parser, progress_bar, run_program
+from limit_surface_ros.tools.common.program import program_parser, progress_bar, run_program
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -12,8 +12,8 @@ from catalogue_helpers import OPTIONS, matrices, write_objects
 from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.tools import fit_catalogue, fit_surface
-from limit_surface_ros.tools.fit_options import refuse_options_of_others
-from limit_surface_ros.tools.training_data import CONTACT, PUSHES
+from limit_surface_ros.tools.common.fit_options import refuse_options_of_others
+from limit_surface_ros.tools.common.training_data import CONTACT, PUSHES
 from process_helpers import group_is_gone, started, until
 
 MODULE = "limit_surface_ros.tools.fit_catalogue"

@@ -74,7 +74,8 @@ def test_nothing_is_lost_when_a_worker_is_killed(dask, address, tmp_path):
 def refusal(folder, address):
     """Run fit_catalogue, impatient, where it must fail; return its exit code and errors."""
     program = (
-        "import sys; from limit_surface_ros.tools import executors, fit_catalogue;"
+        "import sys; from limit_surface_ros.tools import fit_catalogue;"
+        "from limit_surface_ros.tools.common import executors;"
         "executors._CONNECT_TIME = executors._WORKER_TIME = 0.5;"
         "sys.exit(fit_catalogue.main(sys.argv[1:]))"
     )

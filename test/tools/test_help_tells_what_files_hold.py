@@ -6,7 +6,7 @@ import runpy
 
 import pytest
 
-from limit_surface_ros.tools.program import FILES_PAGE
+from limit_surface_ros.tools.common.program import FILES_PAGE
 from process_helpers import REPOSITORY
 
 

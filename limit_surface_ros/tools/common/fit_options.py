@@ -6,11 +6,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from limit_surface_ros.errors import RangeError
-from limit_surface_ros.tools.bag_options import OF_BAGS
-from limit_surface_ros.tools.csv_options import OF_CELLS
-from limit_surface_ros.tools.options import refuse_unused
-from limit_surface_ros.tools.surface_fit import EXACT, kind_of, objective_of
-from limit_surface_ros.tools.training_data import BAG, BODY, CONTACT, PUSHES
+from limit_surface_ros.tools.common.bag_options import OF_BAGS
+from limit_surface_ros.tools.common.csv_options import OF_CELLS
+from limit_surface_ros.tools.common.options import refuse_unused
+from limit_surface_ros.tools.common.surface_fit import EXACT, kind_of, objective_of
+from limit_surface_ros.tools.common.training_data import BAG, BODY, CONTACT, PUSHES
 
 if TYPE_CHECKING:
     import argparse

@@ -16,8 +16,8 @@ from limit_surface_ros.decay.targets import Record
 from limit_surface_ros.errors import DataError, FileError, RangeError
 from limit_surface_ros.files.bag_topic import read_topic
 from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
-from limit_surface_ros.tools.csv_options import add_response_options, response_of_csv
-from limit_surface_ros.tools.training_data import is_bag
+from limit_surface_ros.tools.common.csv_options import add_response_options, response_of_csv
+from limit_surface_ros.tools.common.training_data import is_bag
 
 if TYPE_CHECKING:
     import argparse

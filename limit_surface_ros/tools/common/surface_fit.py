@@ -26,10 +26,10 @@ from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.second_approximation import fit_second_approximation
 from limit_surface_ros.surface.kinds.power_sum import thesis_exponents
 from limit_surface_ros.surface.scaling import Scaling
-from limit_surface_ros.tools.bag_options import add_bag_options
-from limit_surface_ros.tools.csv_options import add_cell_options, cell_options
-from limit_surface_ros.tools.options import check_ranges
-from limit_surface_ros.tools.training_data import (
+from limit_surface_ros.tools.common.bag_options import add_bag_options
+from limit_surface_ros.tools.common.csv_options import add_cell_options, cell_options
+from limit_surface_ros.tools.common.options import check_ranges
+from limit_surface_ros.tools.common.training_data import (
     BAG,
     BODY,
     CONTACT,
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.fitting.search import Progress
     from limit_surface_ros.surface.kinds.point_contacts import PointContacts
-    from limit_surface_ros.tools.training_data import TrainingData
+    from limit_surface_ros.tools.common.training_data import TrainingData
 
 
 # What numbers the fit takes: the upper ends keep a slip of the keyboard from filling the memory.

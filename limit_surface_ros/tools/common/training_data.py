@@ -20,7 +20,7 @@ from limit_surface_ros.fitting.simulation import simulated_pairs
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.sampling import random_motions
 from limit_surface_ros.surface.scaling import Scaling
-from limit_surface_ros.tools.bag_options import about_pushes, pushes_of_bag
+from limit_surface_ros.tools.common.bag_options import about_pushes, pushes_of_bag
 
 if TYPE_CHECKING:
     import argparse
