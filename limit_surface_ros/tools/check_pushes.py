@@ -26,7 +26,7 @@ from limit_surface_ros.tools.common.bag_options import (
 )
 from limit_surface_ros.tools.common.csv_options import OF_CELLS, add_cell_options, cell_options
 from limit_surface_ros.tools.common.options import check_output, named_path, refuse_unused
-from limit_surface_ros.tools.common.program import run_program
+from limit_surface_ros.tools.common.program import program_parser, run_program
 from limit_surface_ros.tools.common.training_data import BAG, PUSHES, check_input
 
 if TYPE_CHECKING:
@@ -53,12 +53,7 @@ _USUAL_LENGTH = 0.05
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    top = argparse.ArgumentParser(
-        prog="check_pushes",
-        description=__doc__,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    top = program_parser("check_pushes", __doc__, EPILOG, "pushes", "bag")
     top.add_argument("input", type=named_path, help="recorded pushes (.csv), or a bag")
     top.add_argument(
         "-o", "--output", type=Path, help=f"picture to write: {', '.join(SUFFIXES)}; optional"

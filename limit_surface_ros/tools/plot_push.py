@@ -24,7 +24,7 @@ from limit_surface_ros.tools.common.options import (
     check_picture,
     check_ranges,
 )
-from limit_surface_ros.tools.common.program import run_program
+from limit_surface_ros.tools.common.program import program_parser, run_program
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,12 +56,7 @@ class Body(NamedTuple):
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    top = argparse.ArgumentParser(
-        prog="plot_push",
-        description=__doc__,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    top = program_parser("plot_push", __doc__, EPILOG, "surface", "contact")
     top.add_argument("model", type=Path, metavar="MODEL", help="model or contact file (.yaml)")
     add_picture_options(top, "push.png")
     top.add_argument(

@@ -28,7 +28,7 @@ from limit_surface_ros.tools.common.options import (
     check_ranges,
     refuse_unused,
 )
-from limit_surface_ros.tools.common.program import run_program
+from limit_surface_ros.tools.common.program import program_parser, run_program
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -54,12 +54,7 @@ _CORNERS = 72
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    top = argparse.ArgumentParser(
-        prog="plot_slide",
-        description=__doc__,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    top = program_parser("plot_slide", __doc__, EPILOG, "surface", "decay")
     top.add_argument("model", type=Path, metavar="MODEL", help="model file of a surface (.yaml)")
     add_picture_options(top, "slide.png")
     top.add_argument("--mass", type=float, required=True, help="[kg]")
