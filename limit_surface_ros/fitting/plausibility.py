@@ -25,11 +25,15 @@ SHORTEST, LONGEST = 2e-3, 3.0
 _AGREE, _AGREE_WITH_STATED = 2.8, 5.0
 # Fewer pairs show nothing.
 FEWEST = 6
-# Forces turned by more than this against the motion are in another frame [rad].
-_TURNED = math.radians(30.0)
+# Forces turned by more than the first against the motion are in another frame, and by the second
+# over the root of their number more where there are few [rad]. Moments point against turning
+# rates if their correlation is below the last.
+_TURNED, _TURNED_OF_FEW, _AGAINST = math.radians(30.0), math.radians(60.0), -0.4
 # A bias is told from this part of the friction force on, and so many deviations.
-_BIAS, _DEVIATIONS = 0.15, 5.0
+_BIAS, _DEVIATIONS = 0.2, 6.0
 _FEWEST_FOR_BIAS, _ONE_WAY = 15, 0.6
+# The two lengths disagree if they do by so many deviations, taken from groups of pairs left out.
+_CERTAIN, _GROUPS = 4.0, 10
 # Pushes turn the body if this part of their motion turns it, and lever arms below this part of the
 # length are those of pushes through the centre.
 _TURNS, _ARM, _USUAL_LENGTH = 0.05, 0.05, 0.05
@@ -176,7 +180,8 @@ def _doubts_of_frames(wrenches: Floats, twists: Floats) -> list[Doubt]:
             )
         ]
     angle = math.atan2(turn[1, 0], turn[0, 0])
-    if abs(angle) > math.pi - _TURNED:
+    most = _TURNED + _TURNED_OF_FEW / math.sqrt(len(wrenches))
+    if abs(angle) > math.pi - most:
         against = int(np.count_nonzero(np.sum(wrenches * twists, axis=1) < 0.0))
         return [
             Doubt(
@@ -186,7 +191,7 @@ def _doubts_of_frames(wrenches: Floats, twists: Floats) -> list[Doubt]:
                 True,
             )
         ]
-    if abs(angle) > _TURNED:
+    if abs(angle) > most:
         return [
             Doubt(
                 f"forces are turned by about {math.degrees(angle):.0f} deg against velocities: "
@@ -219,7 +224,9 @@ def _doubts_of_units(
     if known.possible:
         return _doubt_of_stated(known, stated)
     if not math.isfinite(known.of_motions):
-        if float(np.sum(wrenches[:, 2] * twists[:, 2])) >= 0.0:
+        moments, turns = wrenches[:, 2], twists[:, 2]
+        sizes = float(np.linalg.norm(moments) * np.linalg.norm(turns))
+        if float(moments @ turns) > _AGAINST * sizes:
             return []
         return [
             Doubt(
@@ -227,7 +234,11 @@ def _doubts_of_units(
                 True,
             )
         ]
-    if not math.isfinite(known.of_loads) and SHORTEST <= known.of_motions <= LONGEST:
+    of_body = [
+        not math.isfinite(length) or SHORTEST <= length <= LONGEST
+        for length in (known.of_loads, known.of_motions)
+    ]
+    if all(of_body) and not _certainly_apart(wrenches, twists, known):
         return []
     causes = []
     swapped = lengths_of(twists, wrenches)
@@ -248,6 +259,25 @@ def _doubts_of_units(
     if not known.agree and SHORTEST <= known.of_loads <= LONGEST:
         return [Doubt(f"{found}: is one of the units, or the reference point, another?", False)]
     return [Doubt(f"{found}: are the units N, N m, m/s and rad/s?", True)]
+
+
+def _certainly_apart(wrenches: Floats, twists: Floats, known: Lengths) -> bool:
+    """Tell whether the two lengths disagree by more than the scatter of the pairs makes them."""
+    if not math.isfinite(known.of_loads):
+        return False
+    groups = min(_GROUPS, len(wrenches))
+    numbers = np.arange(len(wrenches)) % groups
+    ratios = []
+    for group in range(groups):
+        left = numbers != group
+        some = lengths_of(wrenches[left], twists[left])
+        ratios.append(math.log(some.of_motions / some.of_loads))
+    if not np.isfinite(ratios).all():
+        return False
+    spread = float(np.sum((np.array(ratios) - np.mean(ratios)) ** 2))
+    deviation = math.sqrt((groups - 1) / groups * spread)
+    ratio = abs(math.log(known.of_motions / known.of_loads))
+    return ratio > max(math.log(_AGREE), _CERTAIN * deviation)
 
 
 def _doubt_of_stated(known: Lengths, stated: float | None) -> list[Doubt]:
