@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from limit_surface_ros.checks import Bools, Floats
     from limit_surface_ros.files.bag_reader import Bag
 
-STATIC_TOPIC = "/tf_static"
+STATIC_TOPIC, _LONGEST_LIST = "/tf_static", 300
 ACCEPTED_TRANSFORM = "'x y z roll pitch yaw' or 'x y z qx qy qz qw' [m, rad]"
 
 
@@ -156,6 +156,11 @@ class FrameTree:
         """The names of all frames."""
         return sorted({*self._parents, *self._parents.values()})
 
+    @property
+    def told(self) -> str:
+        """The names of all frames for an error, cut where they are too many."""
+        return ", ".join(self.frames)[:_LONGEST_LIST] or "none"
+
     def times_of(self, target: str, source: str) -> Floats:
         """Return the times of the samples of the moving edge between two frames that has most.
 
@@ -190,8 +195,8 @@ class FrameTree:
         meeting = next((frame for frame in up if frame in down), None)
         if meeting is None:
             raise FrameError(
-                f"no transform from frame {source!r} to {target!r} is in the bag's /tf or "
-                f"/tf_static; frames there: {', '.join(self.frames) or 'none'}"
+                f"no transform from frame {source!r:.60} to {target!r:.60} is in the bag's /tf or "
+                f"/tf_static; frames there: {self.told}"
             )
         return up[: up.index(meeting)] + down[: down.index(meeting)]
 

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 Parts: TypeAlias = tuple[str, str, tuple[float, ...]]
 _ZERO_NORM, _UNIT_WITHIN, _UPRIGHT = 1e-6, 1e-2, np.cos(np.radians(5.0))
 _MOST_FRAMES = 5
+# Longer names of frames are damage.
+_LONGEST_NAME = 120
 
 
 @dataclass(eq=False)
@@ -64,7 +66,7 @@ def _frame(message: Any) -> str:
 
 def _name(frame: Any) -> str:
     """Return a frame's name without the slash at its front that ROS 1 allowed."""
-    return str(frame).lstrip("/")
+    return str(frame).lstrip("/")[:_LONGEST_NAME]
 
 
 def _child(message: Any) -> str:

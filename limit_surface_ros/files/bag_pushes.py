@@ -243,7 +243,7 @@ class _Reading:
         if body is None or frame is None:
             raise FileError(
                 f"{self._path}: {topic} holds transforms: say of which frame with --body, and in "
-                f"which with --fixed; frames there: {', '.join(tree.frames) or 'none'}"
+                f"which with --fixed; frames there: {tree.told}"
             )
         try:
             times = tree.times_of(frame, body)
@@ -365,7 +365,7 @@ class _Reading:
 
     def _ways(self, sensor: str) -> str:
         """Return what helps where wrenches are in a foreign frame, to end a message."""
-        frames = ", ".join(self._frames().frames) or "none"
+        frames = self._frames().told
         return (
             f"; frames in /tf: {frames}. Say --body {sensor} if that is the body's frame, or give "
             "its pose in the body's with --wrench-transform 'x y z roll pitch yaw'"

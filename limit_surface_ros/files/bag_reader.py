@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 ACCEPTED = "the folder of a ROS 2 bag, or an .mcap, .db3 or .bag file"
 BAG_SUFFIXES = (".mcap", ".db3", ".bag")
 _STORED = (*BAG_SUFFIXES, ".zstd", ".yaml")
-_LONGEST_REASON = 200
+_LONGEST_REASON, _LONGEST_LIST = 200, 600
 
 
 class Bag:
@@ -57,12 +57,12 @@ class Bag:
             fit = [key for key, kind in self.types.items() if kind in accepted]
             told = f"; of {what} there are {_listed(fit)}" if accepted else ""
             raise FileError(
-                f"{self.path}: has no topic {name}; there are {_listed(self.types)}{told}"
+                f"{self.path}: has no topic {name:.200}; there are {_listed(self.types)}{told}"
             )
         kind = self.types[name]
         if accepted and kind not in accepted:
             raise FileError(
-                f"{self.path}: topic {name} is of type {kind}; {what} are read of "
+                f"{self.path}: topic {name:.200} is of type {kind:.100}; {what} are read of "
                 f"{', '.join(accepted)}; there are "
                 f"{_listed(f'{key} ({kind})' for key, kind in self.types.items())}"
             )
@@ -167,4 +167,5 @@ def _remedy(path: Path) -> str:
 
 
 def _listed(names: Collection[str] | Iterator[str]) -> str:
-    return ", ".join(sorted(names)) or "none"
+    text = ", ".join(sorted(names)) or "none"
+    return text if len(text) <= _LONGEST_LIST else f"{text[:_LONGEST_LIST]} ..."

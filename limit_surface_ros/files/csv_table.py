@@ -22,8 +22,15 @@ from limit_surface_ros.files.units import unit_of_cell
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+_LONGEST_LIST = 300
 # So many rows of one length are the data, and not a line of numbers in a preamble.
 _ROWS_IN_A_ROW = 3
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names for an error, cut where they are too many."""
+    text = ", ".join(names)
+    return text if len(text) <= _LONGEST_LIST else f"{text[:_LONGEST_LIST]} ..."
 
 
 @dataclass(frozen=True)
@@ -92,7 +99,7 @@ class CsvTable:
     def title(self, column: int) -> str:
         """Return how messages call a column."""
         if self.names is not None and column < len(self.names):
-            return f"column {self.names[column]}"
+            return f"column {self.names[column]:.60}"
         return f"column {column + 1}"
 
     def unit(self, column: int) -> str:
@@ -253,5 +260,5 @@ def _note_guesses(table: CsvTable, known: CsvOptions, plain: Sequence[tuple[int,
         )
     if any(table.units):
         table.notes.append(
-            f"a row of units is read: {', '.join(unit or '-' for unit in table.units)}"
+            f"a row of units is read: {listed([unit or '-' for unit in table.units])}"
         )

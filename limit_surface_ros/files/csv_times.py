@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 # Longer and shorter recordings are no decays that were recorded: the unit is another.
 LONGEST, SHORTEST = 366 * 86400.0, 1e-6
-_DAY = 86400
+_DAY, _LONGEST_CELL = 86400, 60
 # Columns that hold nanoseconds since 1970, as rostopic of ROS 1 writes them.
 _NANOSECONDS = re.compile(r"^%time$|header[./]stamp$")
 _SECOND_PART = re.compile(r"^(?P<stem>.*?)(secs?|seconds)$")
@@ -76,14 +76,14 @@ def find_times(table: CsvTable, wanted: int | None, unit: str | None = None) -> 
     bare, stated = units.split_unit(name, units.TIME)
     if stated is not None and units.plain(stated) not in units.TIME:
         raise FileError(
-            f"{table.path}: times are in {stated!r} by the column's name {name!r}; accepted are "
-            f"{', '.join(units.TIME)}"
+            f"{table.path}: times are in {stated!r:.60} by the column's name {name!r:.60}; "
+            f"accepted are {', '.join(units.TIME)}"
         )
     below = table.unit(column)
     if unit is None and stated is None and below:
         if units.plain(below) not in units.TIME:
             raise FileError(
-                f"{table.path}: times are in {below!r} by the row of units; accepted are "
+                f"{table.path}: times are in {below!r:.60} by the row of units; accepted are "
                 f"{', '.join(units.TIME)}"
             )
         stated = below
@@ -190,7 +190,8 @@ def _seconds_of_date(table: CsvTable, row: int, date: re.Match[str]) -> Decimal:
 def _refuse_order(table: CsvTable, found: TimeColumns, row: int, last: int, equal: bool) -> None:
     """Raise the error of a time that does not rise."""
     column = found.columns[0]
-    now, before = table.rows[row][column], table.rows[last][column]
+    now, before = table.rows[row][column][:_LONGEST_CELL], table.rows[last][column]
+    before = f"{before[:_LONGEST_CELL]} of line {table.lines[last]}"
     place = f"{table.path}: line {table.lines[row]}"
     if equal:
         raise FileError(
@@ -200,10 +201,7 @@ def _refuse_order(table: CsvTable, found: TimeColumns, row: int, last: int, equa
     hint = ""
     if table.form.delimiter == "," and table.form.decimal == ".":
         hint = "; are there decimal commas? Then separate cells by semicolons, or --decimal ','"
-    raise FileError(
-        f"{place}: the times must increase: {now} is before {before} of line {table.lines[last]}"
-        f"{hint}"
-    )
+    raise FileError(f"{place}: the times must increase: {now} is before {before}{hint}")
 
 
 def _check_span(table: CsvTable, found: TimeColumns, times: Floats) -> None:

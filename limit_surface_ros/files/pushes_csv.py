@@ -20,7 +20,7 @@ import numpy as np
 from limit_surface_ros.checks import LARGEST, SMALLEST
 from limit_surface_ros.errors import DataError, FileError
 from limit_surface_ros.files import units
-from limit_surface_ros.files.csv_table import read_table
+from limit_surface_ros.files.csv_table import listed, read_table
 from limit_surface_ros.files.regular_file import json_object
 from limit_surface_ros.surface.pairs import Pairs
 
@@ -188,7 +188,7 @@ def _column(table: CsvTable, name: str) -> int:
     places = _places(names, name)
     if len(places) != 1:
         found = "is given twice" if places else "is missing"
-        got = f"got {', '.join(names)}" if names else "no line names the columns"
+        got = f"got {listed(names)}" if names else "no line names the columns"
         raise FileError(
             f"{table.path}: line {table.names_line}: column {name} {found}; needed are "
             f"{', '.join(COLUMNS)}, {got}; cells are read as separated {table.form.in_words}"
@@ -207,13 +207,13 @@ def _factor(table: CsvTable, wanted: str, column: int) -> float:
         return 1.0
     if in_name and below and units.plain(in_name) != units.plain(below):
         raise FileError(
-            f"{table.path}: {table.title(column)} is in {in_name!r} by its name and in {below!r} "
-            "by the row of units"
+            f"{table.path}: {table.title(column)} is in {in_name!r:.60} by its name and in "
+            f"{below!r:.60} by the row of units"
         )
     factor = known.get(units.plain(stated))
     if factor is None:
         raise FileError(
-            f"{table.path}: {table.title(column)} is in {stated!r}; accepted are "
+            f"{table.path}: {table.title(column)} is in {stated!r:.60}; accepted are "
             f"{', '.join(known)}"
         )
     if factor != 1.0:

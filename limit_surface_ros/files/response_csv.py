@@ -18,7 +18,7 @@ from limit_surface_ros.checks import as_positive, counted
 from limit_surface_ros.decay.targets import Record
 from limit_surface_ros.errors import DataError, FileError, RangeError
 from limit_surface_ros.files import units
-from limit_surface_ros.files.csv_table import read_table
+from limit_surface_ros.files.csv_table import listed, read_table
 from limit_surface_ros.files.csv_times import find_times, read_times
 
 if TYPE_CHECKING:
@@ -156,12 +156,12 @@ def _refuse_constant(table: CsvTable, value: int, values: Floats) -> None:
         and len({cells[column] for cells in table.rows if len(cells) > column}) > 1
     ]
     if others:
-        listed = ", ".join(
+        columns = [
             str(column + 1) if table.names is None else table.names[column] for column in others
-        )
+        ]
         raise FileError(
             f"{table.path}: {table.title(value)} is {values[0]:g} all the time; name another with "
-            f"--value-column: {listed}"
+            f"--value-column: {listed(columns)}"
         )
 
 
@@ -192,4 +192,4 @@ def _column(table: CsvTable, wanted: str) -> int:
             f"{table.width} is accepted, too"
         )
     found = "given twice" if wanted in names else "missing"
-    raise FileError(f"{table.path}: column {wanted!r} is {found}; there are {', '.join(names)}")
+    raise FileError(f"{table.path}: column {wanted!r} is {found}; there are {listed(names)}")
