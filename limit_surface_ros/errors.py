@@ -110,6 +110,12 @@ class TransformTooNewError(FrameError):
     code = "TRANSFORM_TOO_NEW"
 
 
+class UnavailableError(LimitSurfaceError, RuntimeError):
+    """A node is ending, locked, or has too much to do: the request itself may be right."""
+
+    code = "UNAVAILABLE"
+
+
 class SolverError(LimitSurfaceError, ArithmeticError):
     """A numerical method could not certify its answer."""
 

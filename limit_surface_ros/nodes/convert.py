@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages to arrays and back; numbers are checked here, at the boundary."""
+"""Messages to numbers and back: what comes in is checked here, at the boundary."""
 
 from __future__ import annotations
 
@@ -21,10 +21,12 @@ from limit_surface_ros.errors import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from builtin_interfaces.msg import Time
     from geometry_msgs.msg import Point, Twist, Vector3, Wrench
 
     from limit_surface_ros.checks import Floats
 
+SECOND = 1_000_000_000
 _WRENCH = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 _TWIST = ("linear.x", "linear.y", "linear.z", "angular.x", "angular.y", "angular.z")
 
@@ -97,6 +99,8 @@ def fill_twist(message: Twist, twist: Sequence[float]) -> None:
 def rows_of(name: str, numbers: array[float], most: int) -> Floats:
     """Return a flat, row-major float64[] field as rows of three, without copying it.
 
+    The numbers are not looked at: `checked_rows` does, slice by slice.
+
     Args:
         name: Name of the field.
         numbers: What it holds.
@@ -104,9 +108,7 @@ def rows_of(name: str, numbers: array[float], most: int) -> Floats:
 
     Raises:
         ShapeError: The length is no multiple of three.
-        NotFiniteError: A number is NaN or infinite.
-        RangeError: Rows are too many, or one is beyond `LARGEST` or below `SMALLEST` in size.
-        ZeroVectorError: A row is zero; all these errors name the first bad row.
+        RangeError: Rows are too many.
     """
     flat = np.frombuffer(numbers, dtype=np.float64) if len(numbers) else np.empty(0)
     if flat.size % 3:
@@ -118,6 +120,22 @@ def rows_of(name: str, numbers: array[float], most: int) -> Floats:
         raise RangeError(
             f"{name} holds {len(rows)} rows; at most {most} are accepted, see max_batch_rows"
         )
+    return rows
+
+
+def checked_rows(name: str, rows: Floats, first: int = 0) -> Floats:
+    """Return rows of three whose numbers are good.
+
+    Args:
+        name: Name of the field.
+        rows: Shape (n, 3), a part of the field's rows.
+        first: Number of the first of them in the field.
+
+    Raises:
+        NotFiniteError: A number is NaN or infinite.
+        RangeError: A row is beyond `LARGEST` or below `SMALLEST` in size.
+        ZeroVectorError: A row is zero; all these errors name the first bad row.
+    """
     x, y, turn = np.abs(rows).T
     # Column by column: numpy reduces short rows one by one.
     sizes = np.maximum(np.maximum(x, y), turn)
@@ -125,7 +143,7 @@ def rows_of(name: str, numbers: array[float], most: int) -> Floats:
     fits = (sizes >= SMALLEST) & (sizes <= LARGEST)
     if not fits.all():
         row = int(np.argmin(fits))
-        raise _bad_row(f"{name} row {row}", rows[row].tolist())
+        raise _bad_row(f"{name} row {first + row}", rows[row].tolist())
     return rows
 
 
@@ -146,3 +164,21 @@ def flat_of(values: Floats) -> array[float]:
     flat = array("d")
     flat.frombytes(np.ascontiguousarray(values, dtype=np.float64).view(np.uint8).data)
     return flat
+
+
+def nanoseconds(stamp: Time) -> int:
+    """Return a stamp in [ns] since time zero; 0 is a stamp that was not set.
+
+    Raises:
+        RangeError: The stamp is before time zero, or its fraction is not below a second.
+    """
+    if stamp.sec < 0 or stamp.nanosec >= SECOND:
+        raise RangeError(
+            f"a stamp must have sec >= 0 and nanosec < 1e9, got {stamp.sec} and {stamp.nanosec}"
+        )
+    return int(stamp.sec) * SECOND + int(stamp.nanosec)
+
+
+def fill_stamp(stamp: Time, time: int) -> None:
+    """Write a time [ns] into a stamp."""
+    stamp.sec, stamp.nanosec = divmod(time, SECOND)

@@ -1,20 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From the frame of a message to the frame of a model: static transforms, and tf2 where it is.
+"""From the frame of a message to another: fixed transforms of a parameter, and tf2 where it is.
 
 tf2_ros is optional: it is imported when a node starts, and without it (it is not on the Python
-package index) the static transforms of the node's parameter are all there is.
+package index) the static transforms of the node's parameter are all there is. A transform that is
+not there yet, as that of a sensor on a moving arm when its message comes, is waited for.
 """
 
 from __future__ import annotations
 
 import importlib.util
-from typing import TYPE_CHECKING
+import time
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rclpy.clock import Clock, ClockType
 from rclpy.time import Time
 
-from limit_surface_ros.errors import FrameError, TransformTooNewError, TransformTooOldError
+from limit_surface_ros.checks import shortened
+from limit_surface_ros.errors import (
+    FrameError,
+    TransformTooNewError,
+    TransformTooOldError,
+    UnavailableError,
+)
+from limit_surface_ros.nodes.convert import nanoseconds
+from limit_surface_ros.nodes.endpoints import Waiting
 from limit_surface_ros.nodes.settings import Setting
-from limit_surface_ros.nodes.stamps import nanoseconds
 from limit_surface_ros.nodes.static_transforms import StaticTransforms
 from limit_surface_ros.surface.frames import RigidTransform
 
@@ -45,7 +55,37 @@ SETTINGS = (
         "Look up frames that the static transforms do not know in /tf, if tf2_ros is installed",
         read_only=True,
     ),
+    Setting(
+        "transform_timeout",
+        0.1,
+        "How long an input waits for the transform of its frame at its stamp, in node time [s]; "
+        "0: what is not there is refused",
+        minimum=0.0,
+        maximum=60.0,
+    ),
+    Setting(
+        "transform_tolerance",
+        0.0,
+        "Take the newest transform if it is at most that much older than an input, instead of "
+        "waiting for one at its stamp [s]",
+        minimum=0.0,
+        maximum=3600.0,
+    ),
 )
+# Inputs that wait; what more come are refused at once.
+MOST_WAITING = 2000
+# How often it is looked whether somebody has waited in vain [s].
+_SWEEP = 0.01
+# A paused clock holds nobody longer than this many times transform_timeout, in real time.
+_PATIENCE = 10.0
+
+
+class _Wait(NamedTuple):
+    """An input that waits for its transform."""
+
+    waiting: Waiting
+    since: int
+    real_since: float
 
 
 class Frames:
@@ -54,31 +94,40 @@ class Frames:
     Args:
         node: The node; tf2's listener subscribes through it.
         parameters: Its parameters, which include `SETTINGS`.
+        buffer: What has the methods of a `tf2_ros.Buffer` and is filled by somebody else; None:
+            one of tf2's own, if `use_tf` is set and tf2_ros is installed.
     """
 
-    def __init__(self, node: Node, parameters: Parameters) -> None:
+    def __init__(self, node: Node, parameters: Parameters, buffer: Any = None) -> None:
         """Read the static transforms and start listening to tf2 where it is installed."""
+        self._node = node
         self._parameters = parameters
         self._static = StaticTransforms()
-        self._buffer = None
-        unused = _why_tf_is_not_used(parameters)
-        if not unused:
-            self._buffer = _Tf2(node)
+        unused = "" if buffer is not None else _why_tf_is_not_used(parameters)
+        self._buffer = buffer if buffer is not None or unused else _listening_buffer(node)
         node.get_logger().info(
             "frames: by static_transforms, "
             + (f"not by /tf: {unused}" if unused else "others by /tf")
         )
-        parameters.concern(["static_transforms"], self._prepare)
+        self._waits: list[_Wait] = []
+        self._sweep = node.create_timer(
+            _SWEEP,
+            self._end_waits_in_vain,
+            clock=Clock(clock_type=ClockType.STEADY_TIME),
+            autostart=False,
+        )
+        parameters.on_change(["static_transforms"], self._prepare)
 
-    def to_model(self, target: str, header: Header) -> RigidTransform | None:
+    async def to_frame(self, target: str, header: Header) -> RigidTransform | None:
         """Return the transform from a message's frame to `target`; None: they are the same.
 
-        Nothing is waited for: what is not known at the message's stamp now is refused.
+        Waits for it as long as the parameters say if it is not there yet.
 
         Raises:
             FrameError: The frame is empty, or no transform is known.
             TransformTooOldError: The stamp is older than all that tf2 remembers.
             TransformTooNewError: The stamp is newer than what tf2 has received.
+            UnavailableError: Too many wait already.
         """
         source = header.frame_id
         if source == target:
@@ -87,13 +136,84 @@ class Frames:
             if self._parameters["assume_model_frame"]:
                 return None
             raise FrameError(
-                f"frame_id is empty; give the model's frame {target!r} or one with a known "
+                f"frame_id is empty; give the model's frame {_shown(target)} or one with a known "
                 "transform to it, or set the parameter assume_model_frame"
             )
-        known_here = source in self._static and target in self._static
-        if self._buffer is not None and not known_here:
-            return self._buffer.look_up(target, source, header)
-        return self._static.look_up(target, source)
+        if self._buffer is None or (source in self._static and target in self._static):
+            return self._static.look_up(target, source)
+        stamp = nanoseconds(header.stamp)
+        try:
+            return self._look_up(target, source, stamp)
+        except TransformTooOldError:
+            raise
+        except FrameError:
+            if not self._parameters["transform_timeout"]:
+                raise
+        await self._come(target, source, stamp)
+        return self._look_up(target, source, stamp)
+
+    def _look_up(self, target: str, source: str, stamp: int) -> RigidTransform:
+        """Return the transform at a stamp [ns]; 0 means the latest."""
+        buffer = self._buffer
+        when = Time(nanoseconds=stamp)
+        known, reason = buffer.can_transform(target, source, when, return_debug_tuple=True)
+        if not known:
+            when = self._newest_in_place_of(target, source, stamp, reason)
+        pose = buffer.lookup_transform(target, source, when).transform
+        moved, turned = pose.translation, pose.rotation
+        return RigidTransform.from_quaternion(
+            [moved.x, moved.y, moved.z], [turned.x, turned.y, turned.z, turned.w]
+        )
+
+    def _newest_in_place_of(self, target: str, source: str, stamp: int, reason: str) -> Time:
+        """Return the newest time that is known if it will do, or raise what is wrong."""
+        told = f"no transform from frame {_shown(source)} to the model's frame {_shown(target)}"
+        try:
+            latest = self._buffer.get_latest_common_time(target, source)
+        except Exception as error:
+            # Of tf2's exceptions the base class is all that they have in common.
+            slash = next((frame for frame in (source, target) if frame.startswith("/")), None)
+            hint = f"; frames of tf2 begin with no slash: {_shown(slash[1:])}?" if slash else ""
+            raise FrameError(f"{told} is known: {shortened(str(error), 500)}{hint}") from None
+        age = (stamp - latest.nanoseconds) * 1e-9
+        if age <= 0.0:
+            raise TransformTooOldError(f"{told} at its stamp: {shortened(reason, 500)}")
+        if age > self._parameters["transform_tolerance"]:
+            raise TransformTooNewError(
+                f"{told} at its stamp has come: the newest is {age:.3g} s older"
+            )
+        return latest
+
+    async def _come(self, target: str, source: str, stamp: int) -> None:
+        """Wait until a transform has come, or the time is up."""
+        if len(self._waits) >= MOST_WAITING:
+            raise UnavailableError(f"more than {MOST_WAITING} inputs wait for transforms")
+        waiting = Waiting()
+        coming = self._buffer.wait_for_transform_async(target, source, Time(nanoseconds=stamp))
+        wait = _Wait(waiting, self._now(), time.monotonic())
+        self._waits.append(wait)
+        self._sweep.reset()
+        coming.add_done_callback(lambda _: waiting.settle())
+        try:
+            await waiting
+        finally:
+            self._waits.remove(wait)
+            coming.cancel()
+
+    def _end_waits_in_vain(self) -> None:
+        if not self._waits:
+            self._sweep.cancel()
+            return
+        timeout = self._parameters["transform_timeout"]
+        now, real = self._now(), time.monotonic()
+        for wait in list(self._waits):
+            waited = (now - wait.since) * 1e-9
+            # A clock that was set back has not waited less than no time.
+            if not 0.0 <= waited < timeout or real - wait.real_since > _PATIENCE * timeout:
+                wait.waiting.settle()
+
+    def _now(self) -> int:
+        return int(self._node.get_clock().now().nanoseconds)
 
     def _prepare(self, values: Values) -> Callable[[], None]:
         static = StaticTransforms(values["static_transforms"])
@@ -104,6 +224,10 @@ class Frames:
         return apply
 
 
+def _shown(frame: str) -> str:
+    return repr(shortened(frame))
+
+
 def _why_tf_is_not_used(parameters: Parameters) -> str:
     """Return why not; empty: it is."""
     if not parameters["use_tf"]:
@@ -111,35 +235,10 @@ def _why_tf_is_not_used(parameters: Parameters) -> str:
     return "" if importlib.util.find_spec("tf2_ros") else "tf2_ros is not installed"
 
 
-class _Tf2:
-    """A tf2 buffer that is filled by a listener and never waited for."""
+def _listening_buffer(node: Node) -> Any:
+    import tf2_ros
 
-    def __init__(self, node: Node) -> None:
-        import tf2_ros
-
-        self._tf2 = tf2_ros
-        self._buffer = tf2_ros.Buffer(node=node)
-        self._listener = tf2_ros.TransformListener(self._buffer, node)
-
-    def look_up(self, target: str, source: str, header: Header) -> RigidTransform:
-        """Return the transform at the header's stamp; a zero stamp means the latest."""
-        stamp = nanoseconds(header.stamp)
-        try:
-            pose = self._buffer.lookup_transform(target, source, Time(nanoseconds=stamp)).transform
-        except self._tf2.ExtrapolationException as error:
-            # What is outside of tf2's memory lies before or after it; of a single transform its
-            # words do not tell which.
-            latest = self._buffer.get_latest_common_time(target, source).nanoseconds
-            kind = TransformTooNewError if stamp > latest else TransformTooOldError
-            raise kind(
-                f"no transform from frame {source!r} to the model's frame {target!r}: {error}"
-            ) from None
-        except self._tf2.TransformException as error:
-            raise FrameError(
-                f"no transform from frame {source!r} to the model's frame {target!r} is known: "
-                f"{error}"
-            ) from None
-        moved, turned = pose.translation, pose.rotation
-        return RigidTransform.from_quaternion(
-            [moved.x, moved.y, moved.z], [turned.x, turned.y, turned.z, turned.w]
-        )
+    buffer = tf2_ros.Buffer(node=node)
+    # It lives as long as the buffer.
+    buffer.listener_of_this_node = tf2_ros.TransformListener(buffer, node)
+    return buffer

@@ -1,13 +1,253 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The `limit_surface` node in a process of its own: wrench to twist and twist to wrench."""
+"""The `limit_surface` node: wrench to twist and twist to wrench over services and topics."""
 
 from __future__ import annotations
 
 import sys
+from typing import TYPE_CHECKING, Any
 
-from limit_surface_ros.nodes import spin
-from limit_surface_ros.nodes.model_node import COMMON_SETTINGS
-from limit_surface_ros.nodes.surface_node import NAME, SETTINGS, LimitSurfaceNode
+from geometry_msgs.msg import TwistStamped, WrenchStamped
+from limit_surface_interfaces.srv import (
+    DescribeModel,
+    ListModels,
+    Push,
+    TwistsToWrenches,
+    TwistToWrench,
+    WrenchesToTwists,
+    WrenchToTwist,
+)
+
+from limit_surface_ros.files.surface_file import SurfaceModel, read_surface_model
+from limit_surface_ros.motion.push import ContactMode, push
+from limit_surface_ros.nodes import convert, frames, model_info, planar_input, spin, surface_markers
+from limit_surface_ros.nodes.batches import Batches, empty_rows
+from limit_surface_ros.nodes.endpoints import Service
+from limit_surface_ros.nodes.frames import Frames
+from limit_surface_ros.nodes.model_host import model_settings
+from limit_surface_ros.nodes.model_info import ModelList
+from limit_surface_ros.nodes.model_node import COMMON_SETTINGS, ModelNode
+from limit_surface_ros.nodes.planar_input import (
+    PlanarInput,
+    rows_at_origin,
+    twist_at_origin,
+    wrench_at_origin,
+)
+from limit_surface_ros.nodes.settings import Setting
+from limit_surface_ros.nodes.surface_markers import SurfaceMarkers
+from limit_surface_ros.surface.frames import power
+
+if TYPE_CHECKING:
+    from std_msgs.msg import Header
+
+    from limit_surface_ros.surface.base import LimitSurface
+
+NAME = "limit_surface"
+SETTINGS = (
+    *model_settings("config/models", "limit surfaces"),
+    Setting(
+        "max_batch_rows",
+        1_000_000,
+        "Rows of a batch that are answered; others are served between its slices",
+        minimum=1,
+        maximum=10_000_000,
+    ),
+    *frames.SETTINGS,
+    *planar_input.SETTINGS,
+    *surface_markers.SETTINGS,
+)
+MODES = {
+    ContactMode.STICK: Push.Response.STICK,
+    ContactMode.SLIDE_LEFT: Push.Response.SLIDE_LEFT,
+    ContactMode.SLIDE_RIGHT: Push.Response.SLIDE_RIGHT,
+    ContactMode.SEPARATE: Push.Response.SEPARATE,
+}
+
+
+class LimitSurfaceNode(ModelNode[SurfaceModel]):
+    """Serves the two maps of limit surfaces.
+
+    Attributes:
+        input: Messages as its surfaces take them.
+        batches: Runs what takes long.
+
+    Args:
+        buffer: What transforms are looked up in, in place of a tf2 buffer of the node's own.
+        options: Passed on to `rclpy.node.Node`.
+
+    Raises:
+        LimitSurfaceError: A parameter or a model file is not accepted.
+        ParameterException: A parameter has the wrong type or lies outside its range.
+    """
+
+    def __init__(self, *, buffer: Any = None, **options: Any) -> None:
+        """Read the models and start serving."""
+        super().__init__(NAME, SETTINGS, read_surface_model, prepare_surface, **options)
+        self._list = ModelList(self._info)
+        self.input = PlanarInput(self.values, Frames(self, self.values, buffer), self.report)
+        self.batches = Batches(self.endpoints)
+        self.markers = SurfaceMarkers(self, self._present)
+        self._twists = self.endpoints.add_output(TwistStamped, "predicted_twist")
+        self._wrenches = self.endpoints.add_output(WrenchStamped, "required_wrench")
+        for service in SERVICES:
+            self.endpoints.serve(service)
+        self.endpoints.add_input(WrenchStamped, "wrench", self._predict)
+        self.endpoints.add_input(TwistStamped, "twist", self._require)
+
+    def list_models(self, _: ListModels.Request, response: ListModels.Response) -> None:
+        """Answer `~/list_models`."""
+        response.models = self._list.infos(self.models.models, self.input.policy)
+
+    def describe_model(
+        self, request: DescribeModel.Request, response: DescribeModel.Response
+    ) -> None:
+        """Answer `~/describe_model`."""
+        model = self.models[request.model]
+        response.name = model.name
+        response.summary = model_info.surface_summary(model, self.input.policy.frame_of(model))
+        response.fit = model_info.provenance(model)
+
+    def _info(self, model: SurfaceModel, is_default: bool) -> Any:
+        return model_info.surface_info(model, is_default, self.input.policy.frame_of(model))
+
+    def _present(self) -> tuple[SurfaceModel, LimitSurface, str]:
+        model, policy = self.models[""], self.input.policy
+        return model, policy.surface_of(model), policy.frame_of(model)
+
+    async def _predict(self, message: WrenchStamped) -> None:
+        model = self.models[""]
+        surface, wrench, frame = await self.input.wrench(model, message)
+        self.markers.note(model, surface, wrench, frame)
+        answer = TwistStamped()
+        if surface.load_factor(wrench) >= 1.0:
+            twist = surface.twist_of_wrench(wrench)
+            convert.fill_twist(answer.twist, twist_at_origin(model, twist))
+        fill_header(answer.header, message.header, frame)
+        self._twists.publish(answer)
+
+    async def _require(self, message: TwistStamped) -> None:
+        model = self.models[""]
+        surface, twist, frame = await self.input.twist(model, message)
+        answer = WrenchStamped()
+        wrench = surface.wrench_of_twist(twist)
+        convert.fill_wrench(answer.wrench, wrench_at_origin(model, wrench))
+        fill_header(answer.header, message.header, frame)
+        self._wrenches.publish(answer)
+
+
+async def wrench_to_twist(
+    node: LimitSurfaceNode, request: WrenchToTwist.Request, response: WrenchToTwist.Response
+) -> None:
+    """Answer `~/wrench_to_twist`."""
+    model = node.models[request.model]
+    surface, wrench, frame = await node.input.wrench(model, request.wrench)
+    node.markers.note(model, surface, wrench, frame)
+    twist, factor = surface.twist_and_load_factor(wrench)
+    convert.fill_twist(response.twist.twist, twist_at_origin(model, twist))
+    limit = wrench_at_origin(model, wrench / factor)
+    convert.fill_wrench(response.limit_wrench.wrench, limit)
+    response.load_factor = float(factor)
+    response.slides = bool(factor >= 1.0)
+    for stamped in (response.twist, response.limit_wrench):
+        fill_header(stamped.header, request.wrench.header, frame)
+
+
+async def twist_to_wrench(
+    node: LimitSurfaceNode, request: TwistToWrench.Request, response: TwistToWrench.Response
+) -> None:
+    """Answer `~/twist_to_wrench`."""
+    model = node.models[request.model]
+    surface, twist, frame = await node.input.twist(model, request.twist)
+    wrench = surface.wrench_of_twist(twist)
+    convert.fill_wrench(response.wrench.wrench, wrench_at_origin(model, wrench))
+    response.power = float(wrench @ twist)
+    fill_header(response.wrench.header, request.twist.header, frame)
+
+
+async def wrenches_to_twists(
+    node: LimitSurfaceNode,
+    request: WrenchesToTwists.Request,
+    response: WrenchesToTwists.Response,
+) -> None:
+    """Answer `~/wrenches_to_twists`."""
+    model, policy = node.models[request.model], node.input.policy
+    rows = convert.rows_of("wrenches", request.wrenches, node.values["max_batch_rows"])
+    there = await node.input.rows_matrix("wrench", model, request.header)
+    back = rows_at_origin("twist", model)
+    surface = policy.surface_of(model)
+    response.twists, twists = empty_rows(len(rows), 3)
+    response.load_factors, factors = empty_rows(len(rows), 1)
+
+    def work(part: slice) -> None:
+        wrenches = convert.checked_rows("wrenches", rows[part], part.start)
+        wrenches = wrenches if there is None else wrenches @ there
+        found, factors[part] = surface.twist_and_load_factor(wrenches)
+        twists[part] = found if back is None else found @ back
+
+    await node.batches.run(len(rows), work)
+    fill_header(response.header, request.header, policy.frame_of(model))
+
+
+async def twists_to_wrenches(
+    node: LimitSurfaceNode,
+    request: TwistsToWrenches.Request,
+    response: TwistsToWrenches.Response,
+) -> None:
+    """Answer `~/twists_to_wrenches`."""
+    model, policy = node.models[request.model], node.input.policy
+    rows = convert.rows_of("twists", request.twists, node.values["max_batch_rows"])
+    there = await node.input.rows_matrix("twist", model, request.header)
+    back = rows_at_origin("wrench", model)
+    surface = policy.surface_of(model)
+    response.wrenches, wrenches = empty_rows(len(rows), 3)
+    response.powers, powers = empty_rows(len(rows), 1)
+
+    def work(part: slice) -> None:
+        twists = convert.checked_rows("twists", rows[part], part.start)
+        twists = twists if there is None else twists @ there
+        found = surface.wrench_of_twist(twists)
+        powers[part] = power(found, twists)
+        wrenches[part] = found if back is None else found @ back
+
+    await node.batches.run(len(rows), work)
+    fill_header(response.header, request.header, policy.frame_of(model))
+
+
+async def push_at_a_point(
+    node: LimitSurfaceNode, request: Push.Request, response: Push.Response
+) -> None:
+    """Answer `~/push`."""
+    model, policy = node.models[request.model], node.input.policy
+    contact = await node.input.contact(model, request)
+    pushed = push(policy.surface_of(model), *contact)
+    convert.fill_twist(response.twist.twist, twist_at_origin(model, pushed.twist))
+    convert.fill_wrench(response.wrench.wrench, wrench_at_origin(model, pushed.wrench))
+    response.mode = MODES[pushed.mode]
+    for stamped in (response.twist, response.wrench):
+        fill_header(stamped.header, request.header, policy.frame_of(model))
+
+
+SERVICES = (
+    Service(WrenchToTwist, "wrench_to_twist", wrench_to_twist),
+    Service(TwistToWrench, "twist_to_wrench", twist_to_wrench),
+    Service(WrenchesToTwists, "wrenches_to_twists", wrenches_to_twists),
+    Service(TwistsToWrenches, "twists_to_wrenches", twists_to_wrenches),
+    Service(Push, "push", push_at_a_point),
+    Service(ListModels, "list_models", LimitSurfaceNode.list_models),
+    Service(DescribeModel, "describe_model", LimitSurfaceNode.describe_model),
+)
+
+
+def fill_header(header: Header, asked: Header, frame: str) -> None:
+    """Answers keep the stamp that they answer and stand in the model's frame."""
+    header.stamp = asked.stamp
+    header.frame_id = frame
+
+
+def prepare_surface(model: SurfaceModel) -> None:
+    """Do ahead what the first requests would have to wait for."""
+    prepare = getattr(model.surface, "prepare", None)
+    if prepare is not None:
+        prepare()
 
 
 def main() -> int:

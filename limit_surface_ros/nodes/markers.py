@@ -56,17 +56,22 @@ class Canvas:
     Attributes:
         model: The model, whose frame and reference point they stand in.
         metres_per_newton: Size of loads.
+        frame: In which the model is served.
     """
 
     model: SurfaceModel
     metres_per_newton: float
+    frame: str
 
     @classmethod
-    def of(cls, model: SurfaceModel, metres_per_newton: float = 0.0) -> Canvas:
-        """Return a canvas; 0 metres to the newton: the surface about as large as the body."""
+    def of(cls, model: SurfaceModel, metres_per_newton: float = 0.0, frame: str = "") -> Canvas:
+        """Return a canvas; 0 metres to the newton: the surface about as large as the body.
+
+        An empty frame is the one of the model's file.
+        """
         scaling = model.surface.scaling
         automatic = 0.5 * AUTOMATIC_WIDTH * scaling.characteristic_length / scaling.friction_force
-        return cls(model, metres_per_newton or automatic)
+        return cls(model, metres_per_newton or automatic, frame or model.frame_id)
 
     @property
     def length(self) -> float:
@@ -80,7 +85,7 @@ class Canvas:
     def marker(self, namespace: str, kind: int, color: tuple[float, float, float]) -> Marker:
         """Return a marker at the reference point without content."""
         marker = Marker(ns=namespace, type=kind, action=Marker.ADD, frame_locked=True)
-        marker.header.frame_id = self.model.frame_id
+        marker.header.frame_id = self.frame
         marker.pose.position.x, marker.pose.position.y = self.model.reference_point
         marker.pose.orientation.w = 1.0
         marker.color = _color(color)

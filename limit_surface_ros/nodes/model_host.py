@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The models that a node serves: read all or none, swapped in one step, reloaded on request."""
+"""The models that a node serves: read all or none, swapped in one step, prepared ahead."""
 
 from __future__ import annotations
 
+import threading
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Generic
 
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 
-from limit_surface_ros.errors import FileError
+from limit_surface_ros.errors import FileError, UnknownModelError
 from limit_surface_ros.files.model_set import Model, ModelSet, read_model_set
 from limit_surface_ros.nodes.settings import Setting
 
@@ -54,6 +55,8 @@ class ModelHost(Generic[Model]):
     Args:
         parameters: The node's parameters, which include `model_settings`.
         read: Reader of one file.
+        prepare: Does ahead for a model what its first requests would have to wait for, in a thread
+            of its own; None: there is nothing.
         warn: Called with what is to be said of a model that is accepted.
         files: Name of the parameter that names the files.
         default: Name of the parameter that names the default model.
@@ -78,13 +81,18 @@ class ModelHost(Generic[Model]):
         files: str = "model_files",
         default: str = "default_model",
         noun: str = "model",
+        prepare: Callable[[Model], object] | None = None,
     ) -> None:
         """Read the models that the parameters name."""
         self._noun = noun
         self._read = read
         self._warn = warn
+        self._prepare_one = prepare
+        self._preparing: ModelSet[Model] | None = None
+        self._thread: threading.Thread | None = None
         self.names = (files, default)
-        parameters.concern(self.names, self._prepare)
+        self._read_last: ModelSet[Model] | None = None
+        parameters.on_change(self.names, self._prepare, as_a_set=True)
 
     def __getitem__(self, name: str) -> Model:
         """Return a model; an empty name is the default model's."""
@@ -97,18 +105,68 @@ class ModelHost(Generic[Model]):
         count = f"{len(models)} loaded from {self.names[0]}"
         return f"{count}: {models.listed()}; default {models.default}"
 
+    @property
+    def prepared(self) -> bool:
+        """Whether all that is done ahead for the present models is done."""
+        return self._thread is None or not self._thread.is_alive()
+
+    def prepare_what_was_read(self) -> None:
+        """Do ahead for the models that were read last what can be; not for the node's thread."""
+        models = self._read_last
+        if models is not None and self._prepare_one is not None:
+            for model in models:
+                self._prepare_one(model)
+
+    def close(self) -> None:
+        """Stop preparing."""
+        self._preparing = None
+
     def _prepare(self, values: Values) -> Callable[[], None]:
         files, default = (values[name] for name in self.names)
         # Warnings belong into the node's log, not to standard error with a line of our source.
         with warnings.catch_warnings(record=True) as raised:
-            models = read_model_set(resolved(files), self._read, default, self._noun)
+            models = self._read_set(files, default)
         for warning in raised:
             self._warn(str(warning.message))
+        self._read_last = models
 
         def apply() -> None:
             self.models = models
+            self._start_preparing(models)
 
         return apply
+
+    def _read_set(self, files: Iterable[str], default: str) -> ModelSet[Model]:
+        try:
+            return read_model_set(resolved(files), self._read, default, self._noun)
+        except UnknownModelError as error:
+            names = " and ".join(self.names)
+            raise UnknownModelError(
+                f"{self.names[1]}: {error}; set {names} in one request, as `ros2 param load` does, "
+                f"or {self.names[1]} to '' first"
+            ) from None
+
+    def _start_preparing(self, models: ModelSet[Model]) -> None:
+        if self._prepare_one is None:
+            return
+        self._preparing = models
+        self._thread = threading.Thread(
+            target=self._prepare_all, args=(models, self._prepare_one), daemon=True
+        )
+        self._thread.start()
+
+    def _prepare_all(
+        self, models: ModelSet[Model], prepare: Callable[[Model], object]
+    ) -> None:
+        default = models[""]
+        for model in [default, *(model for model in models if model is not default)]:
+            if self._preparing is not models:
+                return
+            try:
+                prepare(model)
+            except Exception as error:
+                # It will be answered by, or refused, when it is asked for.
+                self._warn(f"{self._noun} {model.name!r} could not be prepared: {error}")
 
 
 def resolved(entries: Iterable[str]) -> list[str]:

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Models as `~/list_models` tells of them."""
+"""Models as `~/list_models` and `~/describe_model` tell of them."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+import numpy as np
 import yaml
 from limit_surface_interfaces.msg import DecayInfo, ModelInfo
 
@@ -13,7 +14,7 @@ from limit_surface_ros.files.model_set import Model
 from limit_surface_ros.files.yaml_reader import plain
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
     from limit_surface_ros.files.decay_file import DecayModel
     from limit_surface_ros.files.model_set import ModelSet
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 Info = TypeVar("Info", ModelInfo, DecayInfo)
 
 
-class Listing(Generic[Model, Info]):
+class ModelList(Generic[Model, Info]):
     """The list of the models that are served, made anew when others are.
 
     Args:
@@ -32,34 +33,63 @@ class Listing(Generic[Model, Info]):
     def __init__(self, describe: Callable[[Model, bool], Info]) -> None:
         """List nothing yet."""
         self._describe = describe
-        self._models: ModelSet[Model] | None = None
+        self._made_from: tuple[Any, ...] = ()
         self._infos: list[Info] = []
 
-    def of(self, models: ModelSet[Model]) -> list[Info]:
-        """Return the messages of the models, the default's first."""
-        if models is not self._models:
+    def infos(self, models: ModelSet[Model], policy: object = None) -> list[Info]:
+        """Return the messages of the models, the default's first.
+
+        Args:
+            models: The models.
+            policy: What else the messages depend on.
+        """
+        made_from = (models, policy)
+        if not self._made_from or any(
+            now is not then for now, then in zip(made_from, self._made_from, strict=True)
+        ):
             infos = [self._describe(model, model.name == models.default) for model in models]
             self._infos = sorted(infos, key=lambda info: not info.is_default)
-            self._models = models
+            self._made_from = made_from
         return self._infos
 
 
-def model_info(model: SurfaceModel, is_default: bool) -> ModelInfo:
-    """Return the message for one limit surface."""
+def surface_info(model: SurfaceModel, is_default: bool, frame: str) -> ModelInfo:
+    """Return the message for one limit surface that is served in a frame."""
     surface, scaling = model.surface, model.surface.scaling
     return ModelInfo(
         name=model.name,
         kind=surface.kind,
         terms=surface.terms,
-        frame_id=model.frame_id,
+        frame_id=frame,
         reference_point=list(model.reference_point),
         characteristic_length=scaling.characteristic_length,
         friction_force=scaling.friction_force,
         normal_force=math.nan if model.normal_force is None else model.normal_force,
         is_default=is_default,
         convex=model.convexity.convex,
-        fit=_text(model.fit),
     )
+
+
+def surface_summary(model: SurfaceModel, frame: str) -> str:
+    """Return what a person would check of one limit surface, as lines of YAML."""
+    surface, scaling = model.surface, model.surface.scaling
+    limits = surface.wrench_of_twist(np.concatenate([np.eye(3), -np.eye(3)[:2]]))
+    x, y = model.reference_point
+    lines = [
+        f"kind: {surface.kind}",
+        f"terms: {surface.terms}",
+        f"frame: {frame}",
+        f"reference_point: [{x:.6g}, {y:.6g}]  # [m] in the frame",
+        f"characteristic_length: {scaling.characteristic_length:.6g}  # rho [m]",
+        f"friction_force: {scaling.friction_force:.6g}  # F0, the scale of forces [N]",
+        f"limit_along_x: [{limits[3, 0]:.6g}, {limits[0, 0]:.6g}]  # [N]",
+        f"limit_along_y: [{limits[4, 1]:.6g}, {limits[1, 1]:.6g}]  # [N]",
+        f"largest_moment: {limits[2, 2]:.6g}  # about the reference point [N m]",
+        "normal_force: "
+        + ("null  # not stated" if model.normal_force is None else f"{model.normal_force:.6g}  # [N]"),
+        f"convex: {str(model.convexity.convex).lower()}",
+    ]
+    return "\n".join(lines)
 
 
 def decay_info(model: DecayModel, is_default: bool) -> DecayInfo:
@@ -73,10 +103,29 @@ def decay_info(model: DecayModel, is_default: bool) -> DecayInfo:
         bound_from=model.time_span[0],
         bound_until=model.time_span[1],
         is_default=is_default,
-        fit=_text(model.fit),
     )
 
 
-def _text(fit: Mapping[str, Any]) -> str:
+def decay_summary(model: DecayModel) -> str:
+    """Return what a person would check of one decay model, as lines of YAML."""
+    sum_ = model.sum
+    lines = [
+        "kind: exponential_sum",
+        f"terms: {sum_.terms}",
+        f"onset_value: {sum_.start:.6g}",
+        f"slowest_rate: {sum_.slowest_rate:.6g}  # [1/s]",
+        f"max_error: {model.max_error:.6g}",
+        f"time_span: [{model.time_span[0]:.6g}, {model.time_span[1]:.6g}]  # [s]",
+    ]
+    return "\n".join(lines)
+
+
+def provenance(model: SurfaceModel | DecayModel) -> str:
     """Return how a model came about as YAML; nothing for nothing."""
-    return yaml.safe_dump(plain(dict(fit)), sort_keys=False) if fit else ""
+    if not model.fit:
+        return ""
+    return str(yaml.safe_dump(plain(dict(model.fit)), sort_keys=False))
+
+
+def _terms(surface: Any) -> int:
+    return next(len(getattr(surface, key)) for key in _TERMS if hasattr(surface, key))

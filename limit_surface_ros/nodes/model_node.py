@@ -1,28 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the nodes of this package share: models, guarded services and topics, diagnostics.
+"""What the nodes of this package share: parameters, models, guarded endpoints, diagnostics.
 
-A node built on `ModelNode` adds services and inputs with handlers that convert, call the core and
-convert back. Handlers raise the package's errors freely: here they become error codes, counts, and
-lines in the log that do not flood it; none leaves a callback.
+A node built on `ModelNode` declares services (`endpoints.Service`) and adds inputs and outputs with
+handlers that convert, call the core and convert back.
 """
 
 from __future__ import annotations
 
-import functools
-import time
-import traceback
+import threading
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.qos_overriding_options import QoSOverridingOptions
 from std_srvs.srv import Trigger
 
-from limit_surface_ros.errors import LimitSurfaceError
 from limit_surface_ros.files.model_set import Model, Named
-from limit_surface_ros.nodes import answers, diagnostics, spin
-from limit_surface_ros.nodes.health import Health, InputAge
+from limit_surface_ros.nodes import diagnostics, parameters, spin
+from limit_surface_ros.nodes.endpoints import LOG_PERIOD, Endpoints, Waiting
 from limit_surface_ros.nodes.model_host import ModelHost
 from limit_surface_ros.nodes.parameters import Parameters
 from limit_surface_ros.nodes.peers import Peers
@@ -31,18 +24,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from pathlib import Path
 
-    from rclpy.publisher import Publisher
-
     from limit_surface_ros.nodes.settings import Setting
 
 # Models of a second kind.
 Model2 = TypeVar("Model2", bound=Named)
 
-LOG_PERIOD = 5.0
-DEPTH = 10
-# Requests that wait while one is answered: of more than the usual 10 the oldest would be lost.
-WAITING = 1000
-COMMON_SETTINGS = (*diagnostics.SETTINGS, spin.EXECUTOR)
+COMMON_SETTINGS = (*diagnostics.SETTINGS, *parameters.SETTINGS, spin.EXECUTOR)
 
 
 class ModelNode(Node, Generic[Model]):
@@ -52,11 +39,13 @@ class ModelNode(Node, Generic[Model]):
         values: Its parameters.
         models: Its models.
         health: What it has seen.
+        endpoints: Its services and topics.
 
     Args:
         name: Name of the node.
         settings: Its parameter table, beside `COMMON_SETTINGS`.
         read: Reader of one model file.
+        prepare: Does ahead for a model what its first requests would have to wait for.
         options: Passed on to `rclpy.node.Node`.
 
     Raises:
@@ -69,22 +58,27 @@ class ModelNode(Node, Generic[Model]):
         name: str,
         settings: Iterable[Setting],
         read: Callable[[Path], Model],
+        prepare: Callable[[Model], object] | None = None,
         **options: Any,
     ) -> None:
         """Declare parameters, read models, start diagnostics."""
         super().__init__(name, **options)
+        self._hosts: list[ModelHost[Any]] = []
         try:
             self.values = Parameters(self, [*settings, *COMMON_SETTINGS])
-            self.models = ModelHost(self.values, read, self.get_logger().warning)
-            self._hosts: list[ModelHost[Any]] = [self.models]
+            self.models = ModelHost(
+                self.values, read, self.get_logger().warning, prepare=prepare
+            )
         except Exception:
             self.destroy_node()
             raise
-        self.health = Health()
-        self.create_service(Trigger, "~/reload", self._reload)
-        self._peers = Peers(self)
+        self._hosts.append(self.models)
+        self.health = diagnostics.Health()
+        peers = Peers(self)
+        self.endpoints = Endpoints(self, self.health, peers)
+        self.endpoints.serve_trigger("reload", self._reload, "the old models keep serving")
         self._diagnostics = diagnostics.Diagnostics(
-            self, self.values, self.health, self._peers, self.describe
+            self, self.values, self.health, peers, self.describe
         )
         self.get_logger().info(self.models.summary)
 
@@ -93,7 +87,12 @@ class ModelNode(Node, Generic[Model]):
         return {"model": self.models.models.default, "models": str(len(self.models.models))}
 
     def add_models(
-        self, read: Callable[[Path], Model2], files: str, default: str, noun: str
+        self,
+        read: Callable[[Path], Model2],
+        files: str,
+        default: str,
+        noun: str,
+        prepare: Callable[[Model2], object] | None = None,
     ) -> ModelHost[Model2]:
         """Serve models of a second kind, reloaded together with the first.
 
@@ -102,12 +101,14 @@ class ModelNode(Node, Generic[Model]):
             files: Name of the parameter that names the files.
             default: Name of the parameter that names the default model.
             noun: What a request calls such a model, for messages.
+            prepare: Does ahead for a model what its first requests would have to wait for.
 
         Raises:
             LimitSurfaceError: A file is not accepted.
         """
+        warn = self.get_logger().warning
         try:
-            host = ModelHost(self.values, read, self.get_logger().warning, files, default, noun)
+            host = ModelHost(self.values, read, warn, files, default, noun, prepare)
         except Exception:
             self.destroy_node()
             raise
@@ -115,135 +116,49 @@ class ModelNode(Node, Generic[Model]):
         self.get_logger().info(host.summary)
         return host
 
-    def add_service(
-        self, service_type: Any, name: str, handler: Callable[[Any, Any], None]
-    ) -> None:
-        """Serve `~/name`; the response ends in `error_code` and `error_msg`.
-
-        Args:
-            service_type: Type of the service.
-            name: Its name, without `~/`.
-            handler: Fills the response for a request, or raises.
-        """
-        self.create_service(
-            service_type,
-            f"~/{name}",
-            functools.partial(self._answer, name, handler),
-            qos_profile=QoSProfile(depth=WAITING),
-        )
-
-    def add_input(
-        self,
-        message_type: Any,
-        name: str,
-        handler: Callable[[Any], None],
-        *,
-        stream: bool = True,
-    ) -> None:
-        """Subscribe to `~/name`.
-
-        Args:
-            message_type: Type of the messages.
-            name: Name of the topic, without `~/`.
-            handler: Takes a message, or raises to drop it.
-            stream: Whether messages come steadily: best effort then, so that any publisher
-                matches, and silence is reported. Otherwise each counts, and none may be lost.
-        """
-        if stream:
-            self.health.inputs[name] = InputAge()
-        reliability = ReliabilityPolicy.BEST_EFFORT if stream else ReliabilityPolicy.RELIABLE
-
-        def take(message: Any) -> None:
-            self._take(name, handler, message)
-            # An executor takes one message each time that it waits, and waiting costs it more than
-            # a message: under load the queue would stay full, and each message wait for all of it.
-            for _ in range(DEPTH - 1):
-                taken = subscription.handle.take_message(message_type, False)
-                if taken is None:
-                    break
-                self._take(name, handler, taken[0])
-
-        subscription = self.create_subscription(
-            message_type,
-            f"~/{name}",
-            take,
-            QoSProfile(depth=DEPTH, reliability=reliability),
-            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
-            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
-        )
-        self._peers.watch_input(f"~/{name}", subscription)
-
-    def add_output(
-        self, message_type: Any, name: str, *, latched: bool = False, depth: int = DEPTH
-    ) -> Publisher:
-        """Publish `~/name`, reliable.
-
-        Args:
-            message_type: Type of the messages.
-            name: Name of the topic, without `~/`.
-            latched: Whether who subscribes later gets the last message.
-            depth: Number of messages that are kept for slow subscribers; 1 if latched.
-        """
-        durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
-        publisher = self.create_publisher(
-            message_type,
-            f"~/{name}",
-            QoSProfile(depth=1 if latched else depth, durability=durability),
-            event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
-            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
-        )
-        self._peers.watch_output(f"~/{name}", publisher)
-        return publisher
-
     def report(self, what: str, sentence: str) -> None:
         """Count something that is accepted but worth a look, and log it with a throttle."""
         self.health.reported[what] += 1
         self.get_logger().warning(sentence, throttle_duration_sec=LOG_PERIOD)
 
-    def _answer(
-        self, name: str, handler: Callable[[Any, Any], None], request: Any, response: Any
-    ) -> Any:
-        start = time.perf_counter()
-        try:
-            handler(request, response)
-            self.health.accepted[name] += 1
-        except Exception as error:
-            # Nothing of a half-filled answer may be taken for one.
-            response = type(response)(
-                error_code=answers.error_code(error), error_msg=self._refuse(name, error)
-            )
-        self.health.times.add(time.perf_counter() - start)
-        return response
+    def destroy_node(self) -> None:
+        """Stop what runs beside the node, and the node."""
+        for host in self._hosts:
+            host.close()
+        super().destroy_node()
 
-    def _take(self, name: str, handler: Callable[[Any], None], message: Any) -> None:
-        start = time.perf_counter()
-        try:
-            handler(message)
-            self.health.accepted[name] += 1
-            if name in self.health.inputs:
-                self.health.inputs[name].last = self.get_clock().now().nanoseconds
-        except Exception as error:
-            self._refuse(name, error)
-        self.health.times.add(time.perf_counter() - start)
+    async def _reload(self, _: Trigger.Request, response: Trigger.Response) -> None:
+        """Read and prepare the models anew in a thread, then swap all of them in one step."""
+        version = None
+        while version != self.values.version:
+            # A parameter that is set meanwhile counts, too.
+            version = self.values.version
+            apply = await self._in_a_thread(self._read_anew)
+        apply()
+        response.message = "; ".join(host.summary for host in self._hosts)
+        response.success = True
+        self.get_logger().info(response.message)
 
-    def _refuse(self, name: str, error: Exception) -> str:
-        sentence = answers.sentence(error)
-        self.health.refuse(name, answers.code_name(error), sentence)
-        if isinstance(error, LimitSurfaceError):
-            self.get_logger().warning(f"{name}: {sentence}", throttle_duration_sec=LOG_PERIOD)
-        else:
-            lines = "".join(traceback.format_exception(error))
-            self.get_logger().error(f"{name}: {lines}", throttle_duration_sec=LOG_PERIOD)
-        return sentence
+    def _read_anew(self) -> Callable[[], None]:
+        apply = self.values.reapply([name for host in self._hosts for name in host.names])
+        for host in self._hosts:
+            host.prepare_what_was_read()
+        return apply
 
-    def _reload(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        start = time.perf_counter()
-        try:
-            self.values.renew([name for host in self._hosts for name in host.names])
-            response.message = "; ".join(host.summary for host in self._hosts)
-            response.success = True
-            self.get_logger().info(response.message)
-        except Exception as error:
-            response.message = f"{self._refuse('reload', error)}; the old models keep serving"
-        self.health.times.add(time.perf_counter() - start)
-        return response
+    async def _in_a_thread(self, work: Callable[[], Any]) -> Any:
+        """Return what `work` returns, or raise what it raises; others are served meanwhile."""
+        done = Waiting()
+        results: list[Any] = []
+
+        def run() -> None:
+            error = None
+            try:
+                results.append(work())
+            except Exception as raised:
+                error = raised
+            # In the node's thread, which this wakes.
+            self.executor.create_task(done.settle, error)
+
+        threading.Thread(target=run, daemon=True).start()
+        await done
+        return results[0]

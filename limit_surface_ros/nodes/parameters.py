@@ -13,22 +13,35 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
-from rclpy.exceptions import InvalidParameterTypeException
+from rclpy.exceptions import InvalidParameterTypeException, ParameterNotDeclaredException
 from rclpy.parameter import Parameter
 
-from limit_surface_ros.errors import LimitSurfaceError, RangeError
+from limit_surface_ros.checks import shortened
+from limit_surface_ros.errors import LimitSurfaceError, RangeError, UnavailableError
 from limit_surface_ros.nodes import answers
+from limit_surface_ros.nodes.settings import Setting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable
 
+    from rcl_interfaces.srv import SetParameters
     from rclpy.node import Node
-
-    from limit_surface_ros.nodes.settings import Setting
 
     # Gets the values as they would be; raises to refuse them, returns what makes them count.
     Prepare = Callable[["Values"], Callable[[], None]]
 
+LOCKED = "locked"
+SETTINGS = (
+    Setting(
+        LOCKED,
+        False,
+        "Whether the node refuses every change of a parameter and ~/reload",
+        read_only=True,
+    ),
+)
+_LOCKED_MESSAGE = (
+    f"this node is locked: it was started with {LOCKED}:=true and takes no changes and no reload"
+)
 # Of numbers without an upper bound; a descriptor's range has two ends.
 _LARGEST = 1.0e300
 _LARGEST_INTEGER = 2**53
@@ -45,12 +58,16 @@ class Values(Protocol):
 class Parameters:
     """The declared parameters of one node.
 
-    A change goes in two steps: everybody concerned prepares it, which may refuse it, and only
-    when nobody did, all of it is applied.
+    A change goes in two steps: all who depend on it prepare it, which may refuse it, and only when
+    nobody did, all of it is applied. Parameters that are prepared together may come in one request
+    in any order, as from `ros2 param load`: they are set at once.
+
+    Attributes:
+        version: Another number after each change.
 
     Args:
         node: The node.
-        table: Its settings.
+        table: Its settings, which include `SETTINGS`.
 
     Raises:
         RangeError: A value given at start is not accepted.
@@ -61,56 +78,130 @@ class Parameters:
         """Declare the table."""
         self._logger = node.get_logger()
         self._settings = {setting.name: setting for setting in table}
-        self._concerned: list[tuple[frozenset[str], Prepare]] = []
+        self._dependents: list[tuple[frozenset[str], Prepare]] = []
+        self._sets: list[frozenset[str]] = []
         self._applied_next: list[Callable[[], None]] = []
         self._values: dict[str, Any] = {}
+        self.version = 0
         for setting in self._settings.values():
             self._values[setting.name] = _plain(_declared(node, setting))
             setting.verify(self._values[setting.name])
         _warn_of_unknown(node, self._settings)
+        self._locked = bool(self._values[LOCKED])
+        # Values of another type than the parameter's, since rclpy would refuse them in its own words.
+        self._mistyped: dict[str, Any] = {}
+        node.add_pre_set_parameters_callback(self._fit_types)
         node.add_on_set_parameters_callback(self._prepare)
         node.add_post_set_parameters_callback(self._apply)
+        self._node = node
+        for service in node.services:
+            if service.service_name.endswith("/set_parameters"):
+                service.callback = self._set
 
     def __getitem__(self, name: str) -> Any:
         """Return the present value."""
         return self._values[name]
 
-    def concern(self, names: Collection[str], prepare: Prepare) -> None:
+    def on_change(
+        self, names: Collection[str], prepare: Prepare, *, as_a_set: bool = False
+    ) -> None:
         """Have `prepare` asked before any of `names` changes, and once now.
+
+        Args:
+            names: The parameters.
+            prepare: Gets the values as they would be; raises to refuse them, returns what makes
+                them count.
+            as_a_set: Whether those of them that come in one request are set at once.
 
         Raises:
             LimitSurfaceError: The present values are refused.
         """
         prepare(self._values)()
-        self._concerned.append((frozenset(names), prepare))
+        self._dependents.append((frozenset(names), prepare))
+        if as_a_set:
+            self._sets.append(frozenset(names))
 
-    def renew(self, names: Collection[str]) -> None:
-        """Have the present values prepared and applied anew, all or none of them.
+    def reapply(self, names: Collection[str]) -> Callable[[], None]:
+        """Have the present values prepared anew; may be called in a thread of its own.
 
         Args:
             names: The parameters; what they name, such as files, may have changed.
 
+        Returns:
+            What makes all of them count.
+
         Raises:
-            LimitSurfaceError: One is refused now; nothing is applied.
+            LimitSurfaceError: One is refused now.
+            UnavailableError: The node is locked.
         """
+        if self._locked:
+            raise UnavailableError(_LOCKED_MESSAGE)
         steps = [
-            prepare(self._values)
-            for concerned, prepare in self._concerned
-            if not concerned.isdisjoint(names)
+            prepare(dict(self._values))
+            for dependent, prepare in self._dependents
+            if not dependent.isdisjoint(names)
         ]
-        for step in steps:
-            step()
+
+        def apply() -> None:
+            for step in steps:
+                step()
+
+        return apply
+
+    def _set(
+        self, request: SetParameters.Request, response: SetParameters.Response
+    ) -> SetParameters.Response:
+        """Set parameters one by one, but those that depend on each other at once."""
+        given = [Parameter.from_parameter_msg(message) for message in request.parameters]
+        results: dict[int, SetParametersResult] = {}
+        for place, parameter in enumerate(given):
+            if place in results:
+                continue
+            together = {parameter.name}.union(
+                *(names for names in self._sets if parameter.name in names)
+            )
+            places = [i for i, other in enumerate(given) if other.name in together]
+            try:
+                result = self._node.set_parameters_atomically([given[i] for i in places])
+            except ParameterNotDeclaredException as error:
+                result = SetParametersResult(successful=False, reason=str(error))
+            results |= dict.fromkeys(places, result)
+        response.results = [results[place] for place in range(len(given))]
+        return response
+
+    def _fit_types(self, parameters: list[Parameter]) -> list[Parameter]:
+        """Take whole numbers where others are wanted, and a text where a list of them is.
+
+        The text is refused in `_prepare`, in words that say how to write a list.
+        """
+        self._mistyped = {}
+        return [self._fitted(parameter) for parameter in parameters]
+
+    def _fitted(self, parameter: Parameter) -> Parameter:
+        setting = self._settings.get(parameter.name)
+        if setting is None:
+            return parameter
+        if isinstance(setting.default, float) and type(parameter.value) is int:
+            return Parameter(parameter.name, value=float(parameter.value))
+        if isinstance(setting.default, list) and isinstance(parameter.value, str):
+            self._mistyped[parameter.name] = parameter.value
+            return Parameter(parameter.name, value=[parameter.value])
+        return parameter
 
     def _prepare(self, parameters: list[Parameter]) -> SetParametersResult:
         # Other parts of a node (use_sim_time, QoS overrides) have parameters of their own.
         changed = {p.name: _plain(p.value) for p in parameters if p.name in self._settings}
         proposed = {**self._values, **changed}
         try:
+            if self._locked:
+                raise UnavailableError(_LOCKED_MESSAGE)
             for name, value in changed.items():
+                if name in self._mistyped:
+                    raise _no_list(name, value[0])
                 self._settings[name].verify(value)
             apply = [
                 prepare(proposed)
-                for names, prepare in self._concerned
+                for names, prepare in self._dependents
                 if not names.isdisjoint(changed)
             ]
         except Exception as error:
@@ -123,6 +214,7 @@ class Parameters:
 
     def _apply(self, parameters: list[Parameter]) -> None:
         apply, self._applied_next = self._applied_next, []
+        self.version += 1
         for step in apply:
             step()
 
@@ -156,18 +248,35 @@ def _declared(node: Node, setting: Setting) -> Any:
     """Declare one parameter and return its value.
 
     Raises:
-        RangeError: A whole number was given for one with a point, which ROS takes for two types.
+        RangeError: A text was given for a list of texts.
         ParameterException: The value has another wrong type or lies outside the range.
     """
     try:
         return _declare(node, setting)
-    except InvalidParameterTypeException as error:
-        given = node.handle.get_parameters(Parameter).get(setting.name)
-        if isinstance(setting.default, float) and given is not None and type(given.value) is int:
-            raise RangeError(
-                f"{setting.name} must have a decimal point: write {given.value}.0"
-            ) from error
+    except InvalidParameterTypeException:
+        given = _given_at_start(node, setting.name)
+        if isinstance(setting.default, float) and type(given) is int:
+            descriptor = describe(setting)
+            value = float(given)
+            return node.declare_parameter(
+                setting.name, value, descriptor, ignore_override=True
+            ).value
+        if isinstance(setting.default, list) and isinstance(given, str):
+            raise _no_list(setting.name, given) from None
         raise
+
+
+def _given_at_start(node: Node, name: str) -> Any:
+    """Return a value of whatever type that was given for a parameter."""
+    node.declare_parameter(name, descriptor=ParameterDescriptor(dynamic_typing=True))
+    value = node.get_parameter(name).value
+    node.undeclare_parameter(name)
+    return value
+
+
+def _no_list(name: str, text: str) -> RangeError:
+    shown = shortened(text)
+    return RangeError(f"{name} must be a list of texts: write ['{shown}'] in place of {shown}")
 
 
 def _declare(node: Node, setting: Setting) -> Any:
@@ -188,7 +297,7 @@ def _warn_of_unknown(node: Node, known: Iterable[str]) -> None:
     for name in given:
         if node.has_parameter(name):
             continue
-        sentence = f"parameter {name!r} is not known here and is ignored"
+        sentence = f"parameter {shortened(name)!r} is not known here and is ignored"
         like = difflib.get_close_matches(name, known, n=1, cutoff=0.75)
         meant = f"; did you mean {like[0]!r}?" if like else ""
         node.get_logger().warning(f"{sentence}{meant}")

@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Who is about that should not be: namesakes, and peers of another type or of unlike QoS.
+"""What goes wrong on a node's topics: duplicates, mismatches of type or QoS, lost messages.
 
-Asked of the graph once a diagnostics period. rclpy's event handlers would say it at once, but they
-take part in every wait of an executor: with them a call of a service takes a tenth longer.
+Asked for once a diagnostics period. rclpy's event handlers would say it at once, but they take part
+in every wait of an executor: with them a call of a service takes a tenth longer.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.duration import Infinite
+from rclpy.event_handler import (
+    EventHandler,
+    QoSSubscriptionEventType,
+    UnsupportedEventTypeError,
+)
 from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
 
 if TYPE_CHECKING:
@@ -78,12 +84,12 @@ class Peers:
             )
         )
 
-    def namesakes(self) -> int:
+    def duplicates(self) -> int:
         """Return how many other nodes have this node's name: each call and input goes to all."""
         own = self._node.get_name(), self._node.get_namespace()
         return max(0, self._node.get_node_names_and_namespaces().count(own) - 1)
 
-    def mismatched(self) -> Iterator[Mismatch]:
+    def mismatches(self) -> Iterator[Mismatch]:
         """Yield the peers that are there now and cannot be heard or served."""
         for end in self._ends:
             for other in end.others(end.topic):
@@ -94,9 +100,41 @@ class Peers:
                 if wrong:
                     yield Mismatch(
                         end.topic,
-                        f"{_name_of(other)} gets or gives nothing on {end.topic}: {wrong}",
+                        f"{_name_of(other)} cannot communicate on {end.topic}: {wrong}",
                         tuple(other.endpoint_gid),
                     )
+
+
+class LostMessages:
+    """The message-lost event of one subscription, asked for and not waited for.
+
+    Args:
+        subscription: The subscription.
+    """
+
+    def __init__(self, subscription: Subscription) -> None:
+        """Attach to the event; a middleware that has none loses nothing that it tells of."""
+        self._event: Any = None
+        self._count = 0
+        try:
+            self._event = EventHandler(
+                callback_group=ReentrantCallbackGroup(),
+                callback=lambda _: None,
+                event_type=QoSSubscriptionEventType.RCL_SUBSCRIPTION_MESSAGE_LOST,
+                parent_impl=subscription.handle,
+            )
+        except UnsupportedEventTypeError:
+            pass
+
+    @property
+    def count(self) -> int:
+        """Messages lost since the subscription began."""
+        if self._event is not None:
+            self._event._ready_to_take_data = True
+            status = self._event.take_data()
+            if status is not None:
+                self._count = int(status.total_count)
+        return self._count
 
 
 def _type_name(kind: Any) -> str:

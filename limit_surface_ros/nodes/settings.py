@@ -11,6 +11,7 @@ import textwrap
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from limit_surface_ros.checks import shortened
 from limit_surface_ros.errors import LimitSurfaceError, RangeError
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ class Setting:
             if self.maximum is not None and number > self.maximum:
                 raise RangeError(f"{self.name} must be at most {self.maximum}, got {number}")
         if self.choices and value not in self.choices:
-            raise RangeError(f"{self.name} must be {self.constraints}; got {value!r}")
+            raise RangeError(f"{self.name} must be {self.constraints}; got {shortened(repr(value))}")
         if self.check is not None:
             try:
                 self.check(value)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limit_surface_ros.checks import shortened
 from limit_surface_ros.errors import FrameError, RangeError
 from limit_surface_ros.surface.frames import RigidTransform
 
@@ -38,11 +39,13 @@ class StaticTransforms:
             parent, child, pose = _parsed(text)
             if child in self._edges:
                 raise RangeError(
-                    f"frame {child!r} has two parents, {self._edges[child][0]!r} and {parent!r}"
+                    f"frame {_shown(child)} has two parents, {_shown(self._edges[child][0])} and "
+                    f"{_shown(parent)}"
                 )
             self._edges[child] = parent, pose
-        parents = (parent for parent, _ in self._edges.values())
-        self._in_root = {frame: self._placed(frame) for frame in [*self._edges, *parents]}
+        self._in_root: dict[str, tuple[str, RigidTransform]] = {}
+        for frame in self._edges:
+            self._place(frame)
 
     def __contains__(self, frame: str) -> bool:
         """Tell whether the frame is part of any tree."""
@@ -57,29 +60,34 @@ class StaticTransforms:
         for frame in (source, target):
             if frame not in self._in_root:
                 raise FrameError(
-                    f"no transform from frame {source!r} to the model's frame {target!r} is "
-                    f"known: frame {frame!r} is in no static transform"
+                    f"no transform from frame {_shown(source)} to the model's frame "
+                    f"{_shown(target)} is known: frame {_shown(frame)} is in no static transform"
+                    + _slash_hint(frame)
                 )
         source_root, source_pose = self._in_root[source]
         target_root, target_pose = self._in_root[target]
         if source_root != target_root:
             raise FrameError(
-                f"no transform from frame {source!r} to the model's frame {target!r} is known: "
-                "no chain of static transforms joins them"
+                f"no transform from frame {_shown(source)} to the model's frame {_shown(target)} is "
+                "known: no chain of static transforms joins them"
             )
         return target_pose.inverse @ source_pose
 
-    def _placed(self, frame: str) -> tuple[str, RigidTransform]:
-        """Return the root above a frame and the frame's pose in it."""
-        pose = RigidTransform(np.eye(3), np.zeros(3))
-        seen = [frame]
-        while frame in self._edges:
-            frame, step = self._edges[frame]
-            if frame in seen:
-                raise RangeError(f"frame {frame!r} is its own ancestor: {' < '.join(seen)}")
-            seen.append(frame)
-            pose = step @ pose
-        return frame, pose
+    def _place(self, frame: str) -> None:
+        """Find the root above a frame and the frame's pose in it, and of all frames between."""
+        chain: dict[str, None] = {}
+        while frame not in self._in_root and frame in self._edges:
+            if frame in chain:
+                told = shortened(" < ".join(chain))
+                raise RangeError(f"frame {_shown(frame)} is its own ancestor: {told}")
+            chain[frame] = None
+            frame = self._edges[frame][0]
+        root, pose = self._in_root.setdefault(
+            frame, (frame, RigidTransform(np.eye(3), np.zeros(3)))
+        )
+        for below in reversed(chain):
+            pose = pose @ self._edges[below][1]
+            self._in_root[below] = root, pose
 
 
 def _parsed(text: str) -> tuple[str, str, RigidTransform]:
@@ -87,8 +95,17 @@ def _parsed(text: str) -> tuple[str, str, RigidTransform]:
     try:
         numbers = [float(word) for word in words[2:]]
     except ValueError as error:
-        raise RangeError(f"{text!r}: {error}; accepted is {ACCEPTED}") from None
+        raise RangeError(f"{_shown(text)}: {error}; accepted is {ACCEPTED}") from None
     if len(numbers) not in (6, 7) or not np.isfinite(numbers).all():
-        raise RangeError(f"{text!r}: accepted is {ACCEPTED}, with finite numbers")
+        raise RangeError(f"{_shown(text)}: accepted is {ACCEPTED}, with finite numbers")
     build = RigidTransform.from_euler if len(numbers) == 6 else RigidTransform.from_quaternion
     return words[0], words[1], build(numbers[:3], numbers[3:])
+
+
+def _shown(name: str) -> str:
+    return repr(shortened(name))
+
+
+def _slash_hint(frame: str) -> str:
+    """Return what is wrong with a name of the ROS 1 kind."""
+    return f"; frames begin with no slash: {_shown(frame[1:])}?" if frame.startswith("/") else ""

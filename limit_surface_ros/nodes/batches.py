@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Long batches in slices: others are served between them, and of several one runs at a time."""
+
+from __future__ import annotations
+
+import collections
+import time
+from array import array
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from limit_surface_ros.errors import UnavailableError
+from limit_surface_ros.nodes.endpoints import Waiting
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.nodes.endpoints import Endpoints
+
+# Time that one slice may take [s]: how long a topic waits in the middle of a batch.
+SLICE = 0.003
+# Rows of the first slice, of which it is learnt how long rows take; a batch of so many is answered
+# in one slice and waits for no other.
+FIRST_ROWS = 1024
+# Bytes of the requests that wait for their turn; what more come are refused.
+MOST_BYTES = 2**28
+
+
+class Batches:
+    """Runs the batches of a node one after the other, each in slices.
+
+    Args:
+        endpoints: The node's, which give others their turns.
+    """
+
+    def __init__(self, endpoints: Endpoints) -> None:
+        """Run nothing yet."""
+        self._endpoints = endpoints
+        self._running = False
+        self._queue: collections.deque[Waiting] = collections.deque()
+        self._bytes = 0
+        endpoints.when_ending.append(self._refuse_all)
+
+    async def run(self, rows: int, work: Callable[[slice], None]) -> None:
+        """Do work on all rows, in slices of them.
+
+        Args:
+            rows: Number of rows.
+            work: Does the work on a slice of the rows; what it raises ends the batch.
+
+        Raises:
+            UnavailableError: Too much waits already, or the node is ending.
+        """
+        if rows <= FIRST_ROWS:
+            work(slice(0, rows))
+            return
+        await self._wait_for_turn(24 * rows)
+        try:
+            count, begin = FIRST_ROWS, 0
+            while begin < rows:
+                end = min(rows, begin + count)
+                start = time.perf_counter()
+                work(slice(begin, end))
+                elapsed = time.perf_counter() - start
+                begin = end
+                if begin < rows:
+                    # At most twice as many as before: one fast slice tells little of the next.
+                    count = max(64, min(2 * count, int(count * SLICE / max(elapsed, 1e-6))))
+                    await self._endpoints.give_way()
+        finally:
+            self._running = bool(self._queue)
+            if self._queue:
+                self._queue.popleft().settle()
+
+    async def _wait_for_turn(self, size: int) -> None:
+        if not self._running:
+            self._running = True
+            return
+        if self._bytes + size > MOST_BYTES:
+            raise UnavailableError(
+                f"batches of {self._bytes >> 20} MiB wait already; ask again later"
+            )
+        waiting = Waiting()
+        self._queue.append(waiting)
+        self._bytes += size
+        try:
+            await waiting
+        finally:
+            self._bytes -= size
+
+    def _refuse_all(self, error: Exception) -> None:
+        while self._queue:
+            self._queue.popleft().settle(error)
+
+
+def empty_rows(rows: int, columns: int) -> tuple[array[float], Floats]:
+    """Return a float64[] field and a view of it as an array of rows to be filled.
+
+    `array.array` is the one type that rclpy takes without looking at each element.
+    """
+    flat = array("d", bytes(8 * rows * columns))
+    view = np.frombuffer(flat, dtype=np.float64) if rows else np.empty(0)
+    return flat, view.reshape((rows, columns) if columns > 1 else (rows,))

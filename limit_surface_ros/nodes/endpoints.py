@@ -1,0 +1,358 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Services and topics whose handlers may raise, wait and take long, without harm to the others.
+
+A handler is a function or a coroutine. What it raises becomes an error code, a count and a line in
+the log. It may wait (`await Waiting()`) and, if it takes long, let the others have a turn
+(`await endpoints.give_way()`): rclpy's executors resume coroutines of services, `Endpoints` those
+of topics.
+"""
+
+from __future__ import annotations
+
+import collections
+import inspect
+import time
+import traceback
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from std_srvs.srv import Trigger
+
+from limit_surface_ros.checks import shortened
+from limit_surface_ros.errors import LimitSurfaceError, UnavailableError
+from limit_surface_ros.nodes import answers
+from limit_surface_ros.nodes.diagnostics import Health, InputAge
+from limit_surface_ros.nodes.peers import LostMessages
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Coroutine, Generator, Iterator
+
+    from rclpy.node import Node
+    from rclpy.publisher import Publisher
+
+    from limit_surface_ros.nodes.peers import Peers
+
+LOG_PERIOD = 5.0
+DEPTH = 10
+# Messages of a stream that wait while one answer leaves or one long request comes in: 1 kHz for a
+# fifth of a second.
+STREAM_DEPTH = 200
+# Requests that wait while one is answered: of more than the usual 10 the oldest would be lost.
+WAITING = 1000
+# Messages of one topic that wait, for a transform say; of more the oldest is refused.
+MOST_WAITING = 500
+
+
+class Waiting:
+    """Something that a coroutine waits for until somebody settles it."""
+
+    def __init__(self) -> None:
+        """Wait."""
+        self.settled = False
+        self.refused_by: Exception | None = None
+        # Set by who drives the coroutine, if it is not an executor.
+        self.resume: Callable[[], None] | None = None
+
+    def settle(self, refused_by: Exception | None = None) -> None:
+        """End the waiting, by raising if there is an error; only the first call counts."""
+        if self.settled:
+            return
+        self.settled, self.refused_by = True, refused_by
+        if self.resume is not None:
+            self.resume()
+
+    def __await__(self) -> Iterator[Waiting]:
+        """Suspend the coroutine until this is settled."""
+        while not self.settled:
+            yield self
+        if self.refused_by is not None:
+            raise self.refused_by
+
+
+class _Turn:
+    """Suspends a coroutine once."""
+
+    def __await__(self) -> Iterator[None]:
+        yield
+
+
+class Service(NamedTuple):
+    """A service of a node, as its module declares it.
+
+    Attributes:
+        type: Type of the service; its response ends in `error_code` and `error_msg`.
+        name: Its name, without `~/`.
+        handler: Function or coroutine function of the node, the request and the response: fills
+            the response, or raises.
+        unbounded: Fields of the response that may be infinite, by their dotted names.
+    """
+
+    type: Any
+    name: str
+    handler: Callable[[Any, Any, Any], Any]
+    unbounded: tuple[str, ...] = ()
+
+
+class Output(NamedTuple):
+    """A publisher whose messages are looked at before they leave.
+
+    Attributes:
+        publisher: The publisher.
+        check: Raises if a number of a message is not finite.
+    """
+
+    publisher: Publisher
+    check: answers.FiniteCheck
+
+    def publish(self, message: Any) -> None:
+        """Send a message.
+
+        Raises:
+            SolverError: A number in it is NaN or infinite; nothing is sent.
+        """
+        self.check(message)
+        self.publisher.publish(message)
+
+
+class Endpoints:
+    """The guarded services, inputs and outputs of one node.
+
+    Attributes:
+        under_way: Requests that have begun and are not answered yet.
+        when_ending: Called with an error for what waits when the node ends.
+        last_request: Steady time at which a request came or was answered last [s].
+
+    Args:
+        node: The node.
+        health: What it has seen.
+        peers: Told of the topics.
+    """
+
+    def __init__(self, node: Node, health: Health, peers: Peers) -> None:
+        """Serve nothing yet."""
+        self._node = node
+        self._health = health
+        self._peers = peers
+        self._group = ReentrantCallbackGroup()
+        self._ending = False
+        self._waiting: dict[str, collections.deque[Waiting]] = {}
+        self.when_ending: list[Callable[[Exception], None]] = []
+        self.under_way = 0
+        self.last_request = 0.0
+
+    def serve(self, service: Service) -> None:
+        """Serve `~/name`."""
+        check = answers.FiniteCheck(service.type.Response, service.unbounded)
+
+        async def answer(request: Any, response: Any) -> Any:
+            return await self._answer(service, check, request, response)
+
+        self._node.create_service(
+            service.type,
+            f"~/{service.name}",
+            answer,
+            qos_profile=QoSProfile(depth=WAITING),
+            callback_group=self._group,
+        )
+
+    def serve_trigger(
+        self, name: str, handler: Callable[[Any, Any], Any], unchanged: str
+    ) -> None:
+        """Serve `~/name` of type std_srvs/Trigger, whose answers hold no error code.
+
+        Args:
+            name: Its name, without `~/`.
+            handler: Function or coroutine function; fills the response, or raises.
+            unchanged: What is said of the node after a refusal.
+        """
+
+        async def answer(request: Trigger.Request, response: Trigger.Response) -> Any:
+            self.under_way += 1
+            try:
+                if self._ending:
+                    raise UnavailableError("the node is ending")
+                await _Timed(handler, (request, response), self._health)
+            except Exception as error:
+                sentence = self.refuse(name, error)
+                response = Trigger.Response(message=f"{sentence}; {unchanged}")
+            self.under_way -= 1
+            self.last_request = time.monotonic()
+            return response
+
+        self._node.create_service(Trigger, f"~/{name}", answer, callback_group=self._group)
+
+    def add_input(
+        self,
+        message_type: Any,
+        name: str,
+        handler: Callable[[Any], Any],
+        *,
+        stream: bool = True,
+    ) -> None:
+        """Subscribe to `~/name`.
+
+        Args:
+            message_type: Type of the messages.
+            name: Name of the topic, without `~/`.
+            handler: Function or coroutine function; takes a message, or raises to drop it.
+            stream: Whether messages come steadily: best effort then, so that any publisher
+                matches, and silence is reported. Otherwise each counts, and none may be lost.
+        """
+        if stream:
+            self._health.inputs[name] = InputAge()
+        self._waiting[name] = collections.deque()
+        reliability = ReliabilityPolicy.BEST_EFFORT if stream else ReliabilityPolicy.RELIABLE
+
+        def take(message: Any) -> None:
+            self._take(name, handler, message)
+            # An executor takes one message each time that it waits, and waiting costs it more than
+            # a message: under load the queue would stay full, and each message wait for all of it.
+            for _ in range(STREAM_DEPTH - 1):
+                taken = subscription.handle.take_message(message_type, False)
+                if taken is None:
+                    break
+                self._take(name, handler, taken[0])
+
+        subscription = self._node.create_subscription(
+            message_type,
+            f"~/{name}",
+            take,
+            QoSProfile(depth=STREAM_DEPTH if stream else DEPTH, reliability=reliability),
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+        )
+        self._health.lost[name] = LostMessages(subscription)
+        self._peers.watch_input(f"~/{name}", subscription)
+
+    def add_output(
+        self, message_type: Any, name: str, *, latched: bool = False, depth: int = DEPTH
+    ) -> Output:
+        """Publish `~/name`, reliable.
+
+        Args:
+            message_type: Type of the messages.
+            name: Name of the topic, without `~/`.
+            latched: Whether who subscribes later gets the last message.
+            depth: Number of messages that are kept for slow subscribers; 1 if latched.
+        """
+        durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
+        publisher = self._node.create_publisher(
+            message_type,
+            f"~/{name}",
+            QoSProfile(depth=1 if latched else depth, durability=durability),
+            event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+        )
+        self._peers.watch_output(f"~/{name}", publisher)
+        return Output(publisher, answers.FiniteCheck(message_type))
+
+    async def give_way(self) -> None:
+        """Let whatever else is due have its turn."""
+        # An executor looks at coroutines again when something happens: make it happen.
+        self._node.executor.create_task(_nothing)
+        await _Turn()
+
+    def end(self) -> None:
+        """Refuse what waits and what comes from now on; answers that have begun are finished."""
+        self._ending = True
+        error = UnavailableError("the node is ending")
+        for queue in self._waiting.values():
+            for waiting in list(queue):
+                waiting.settle(error)
+        for refuse_all in self.when_ending:
+            refuse_all(error)
+
+    def refuse(self, name: str, error: Exception) -> str:
+        """Count and log an error; return the sentence for who asked."""
+        sentence = answers.sentence(error)
+        self._health.refuse(name, answers.code_name(error), sentence)
+        logger = self._node.get_logger()
+        if isinstance(error, LimitSurfaceError):
+            logger.warning(f"{name}: {sentence}", throttle_duration_sec=LOG_PERIOD)
+        else:
+            lines = shortened("".join(traceback.format_exception(error)), 20_000)
+            logger.error(f"{name}: {lines}", throttle_duration_sec=LOG_PERIOD)
+        return sentence
+
+    async def _answer(
+        self, service: Service, check: answers.FiniteCheck, request: Any, response: Any
+    ) -> Any:
+        self.under_way += 1
+        try:
+            if self._ending:
+                raise UnavailableError("the node is ending")
+            await _Timed(service.handler, (self._node, request, response), self._health)
+            check(response)
+            self._health.accepted[service.name] += 1
+        except Exception as error:
+            # Nothing of a half-filled answer may be taken for one.
+            response = service.type.Response(
+                error_code=answers.error_code(error), error_msg=self.refuse(service.name, error)
+            )
+        self.under_way -= 1
+        self.last_request = time.monotonic()
+        return response
+
+    def _take(self, name: str, handler: Callable[[Any], Any], message: Any) -> None:
+        self._step(name, _Timed(handler, (message,), self._health).__await__())
+
+    def _step(self, name: str, handling: Generator[Any, None, Any]) -> None:
+        """Run the handling of a message to its end, or to where it waits."""
+        try:
+            waiting = handling.send(None)
+        except StopIteration:
+            self._health.accepted[name] += 1
+            if name in self._health.inputs:
+                self._health.inputs[name].last = self._node.get_clock().now().nanoseconds
+        except Exception as error:
+            self.refuse(name, error)
+        else:
+            queue = self._waiting[name]
+            queue.append(waiting)
+
+            def resume() -> None:
+                queue.remove(waiting)
+                self._step(name, handling)
+
+            waiting.resume = resume
+            if len(queue) > MOST_WAITING:
+                queue[0].settle(
+                    UnavailableError(f"more than {MOST_WAITING} messages wait for transforms")
+                )
+
+
+class _Timed:
+    """Runs a handler and counts the time of each stretch in which nobody else had a turn."""
+
+    def __init__(
+        self, handler: Callable[..., Any], arguments: tuple[Any, ...], health: Health
+    ) -> None:
+        self._handler = handler
+        self._arguments = arguments
+        self._health = health
+
+    def __await__(self) -> Generator[Any, None, Any]:
+        times = self._health.times
+        start = time.perf_counter()
+        try:
+            running = self._handler(*self._arguments)
+            if not inspect.iscoroutine(running):
+                return running
+            while True:
+                try:
+                    waiting = running.send(None)
+                except StopIteration as ended:
+                    return ended.value
+                times.add(time.perf_counter() - start)
+                yield waiting
+                times = self._health.times
+                start = time.perf_counter()
+        finally:
+            times.add(time.perf_counter() - start)
+
+
+def _nothing() -> None:
+    """Do nothing, as a task that wakes an executor."""
