@@ -88,8 +88,8 @@ def map_calls(node: str, model: str, one: int, many: int) -> list[Call]:
     twist.header.frame_id = "object"
     twist.twist.linear.x, twist.twist.angular.z = 0.1, 1.0
     push = Push.Request(friction=0.3, model=model)
-    push.contact.header.frame_id = "object"
-    push.contact.point.x, push.normal.x, push.velocity.x, push.velocity.y = -0.04, 1.0, 0.1, 0.02
+    push.header.frame_id = "object"
+    push.contact.x, push.normal.x, push.velocity.x, push.velocity.y = -0.04, 1.0, 0.1, 0.02
     single = {
         "wrench_to_twist": WrenchToTwist.Request(model=model, wrench=wrench),
         "twist_to_wrench": TwistToWrench.Request(model=model, twist=twist),

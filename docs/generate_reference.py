@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parent.parent
 INTERFACES = ROOT / "limit_surface_interfaces"
 LAYERS = ("surface", "fitting", "decay", "files", "plots")
 # Nodes whose modules hold a NAME and a table SETTINGS.
-NODES = ("surface_node", "decay_node")
+NODES = ("limit_surface_node", "decay_node")
 
 
 @dataclass
@@ -47,24 +47,36 @@ class Interface:
 
 
 def read_interface(path: Path) -> Interface:
-    """Read an interface file; a comment that stands alone goes with the line above it."""
+    """Read an interface file; a comment is about the field below it.
+
+    One that an empty line follows is about the file, if it is the first, or what comes next.
+    """
     heading: list[str] = []
+    comments: list[str] = []
     interface = Interface(f"{path.parent.name}/{path.stem}", "")
+
+    def end_of_comments() -> None:
+        if not heading and not any(interface.parts):
+            heading.extend(comments)
+        elif comments:
+            interface.parts[-1].append(("", "", " ".join(comments)))
+        comments.clear()
+
     for line in path.read_text(encoding="utf-8").splitlines():
         code, _, comment = (part.strip() for part in line.partition("#"))
-        rows = interface.parts[-1]
         if code == "---":
+            end_of_comments()
             interface.parts.append([])
         elif code:
             kind, _, name = code.partition(" ")
-            rows.append((kind, name.strip(), comment))
-        elif comment and line.startswith("#") and not any(interface.parts):
-            heading.append(comment)
-        elif comment and rows and not line.startswith("#"):
-            kind, name, before = rows[-1]
-            rows[-1] = (kind, name, f"{before} {comment}".strip())
-        elif comment:
-            rows.append(("", "", comment))
+            interface.parts[-1].append(
+                (kind, name.strip(), " ".join([*comments, comment]).strip())
+            )
+            comments.clear()
+        elif line.strip():
+            comments.append(comment)
+        else:
+            end_of_comments()
     interface.text = " ".join(heading)
     return interface
 

@@ -57,6 +57,7 @@ class FiniteCheck:
         self._names = [name for name in numbers if name not in unbounded]
         self._arrays = [name for name in arrays if name not in unbounded]
         self._unbounded = [name for name in unbounded if name in numbers]
+        self._unbounded_arrays = [name for name in unbounded if name in arrays]
         self._numbers = _getter(self._names)
 
     def __call__(self, message: Any) -> None:
@@ -78,6 +79,9 @@ class FiniteCheck:
                 raise _not_finite(f"{name}[{place}]", float(array[place]))
         for name in self._unbounded:
             if math.isnan(attrgetter(name)(message)):
+                raise _not_finite(name, math.nan)
+        for name in self._unbounded_arrays:
+            if np.isnan(np.asarray(attrgetter(name)(message), dtype=np.float64)).any():
                 raise _not_finite(name, math.nan)
 
 

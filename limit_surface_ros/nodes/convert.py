@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from builtin_interfaces.msg import Time
     from geometry_msgs.msg import Point, Twist, Vector3, Wrench
+    from std_msgs.msg import Header
 
     from limit_surface_ros.checks import Floats
 
@@ -182,3 +183,9 @@ def nanoseconds(stamp: Time) -> int:
 def fill_stamp(stamp: Time, time: int) -> None:
     """Write a time [ns] into a stamp."""
     stamp.sec, stamp.nanosec = divmod(time, SECOND)
+
+
+def fill_header(header: Header, asked: Header, frame: str) -> None:
+    """Answers keep the stamp that they answer and stand in the model's frame."""
+    header.stamp = asked.stamp
+    header.frame_id = frame

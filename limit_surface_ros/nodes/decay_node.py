@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from geometry_msgs.msg import Vector3Stamped, WrenchStamped
 from limit_surface_interfaces.msg import DecayForecast
-from limit_surface_interfaces.srv import EvaluateDecay, ListDecays, PredictStop, TimeToLevel
+from limit_surface_interfaces.srv import (
+    DescribeModel,
+    EvaluateDecay,
+    ListDecays,
+    PredictStop,
+    TimeToLevel,
+)
 
 from limit_surface_ros.decay.estimation import EstimationOptions
 from limit_surface_ros.decay.response import onset_value
@@ -17,15 +23,16 @@ from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.decay_file import DecayModel, read_decay_model
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.motion.holding import holds_from
-from limit_surface_ros.nodes import convert, frames, planar_inputs, spin
+from limit_surface_ros.nodes import convert, frames, model_info, planar_input, spin
+from limit_surface_ros.nodes.convert import SECOND, nanoseconds
+from limit_surface_ros.nodes.endpoints import Service
 from limit_surface_ros.nodes.model_host import model_settings
-from limit_surface_ros.nodes.model_info import Listing, decay_info
+from limit_surface_ros.nodes.model_info import ModelList
 from limit_surface_ros.nodes.model_node import COMMON_SETTINGS, ModelNode
 from limit_surface_ros.nodes.onset import Onset
 from limit_surface_ros.nodes.onset_stream import OnsetStream
-from limit_surface_ros.nodes.planar_inputs import PlanarInputs
+from limit_surface_ros.nodes.planar_input import PlanarInput, prepare_surface, twist_at_origin
 from limit_surface_ros.nodes.settings import Setting
-from limit_surface_ros.nodes.stamps import SECOND, nanoseconds
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -84,15 +91,27 @@ SETTINGS = (
         minimum=1e-9,
         maximum=1e9,
     ),
+    Setting(
+        "max_times",
+        100_000,
+        "Times that ~/evaluate answers at once",
+        minimum=1,
+        maximum=10_000_000,
+    ),
     *frames.SETTINGS,
-    *planar_inputs.SETTINGS,
+    *planar_input.SETTINGS,
 )
 
 
 class DecayNode(ModelNode[DecayModel]):
     """Publishes how an onset dies away, corrects it by measurements, predicts when sliding stops.
 
+    Attributes:
+        surfaces: Limit surfaces of the bodies whose stop is predicted.
+        input: Messages as these surfaces take them.
+
     Args:
+        buffer: What transforms are looked up in, in place of a tf2 buffer of the node's own.
         options: Passed on to `rclpy.node.Node`.
 
     Raises:
@@ -100,37 +119,37 @@ class DecayNode(ModelNode[DecayModel]):
         ParameterException: A parameter has the wrong type or lies outside its range.
     """
 
-    def __init__(self, **options: Any) -> None:
+    def __init__(self, *, buffer: Any = None, **options: Any) -> None:
         """Read the models and start serving."""
         super().__init__(NAME, SETTINGS, read_decay_model, **options)
-        self._listing = Listing(decay_info)
-        self._surfaces = self.add_models(
-            read_surface_model, "surface_files", "default_surface", "surface"
+        self._list = ModelList(model_info.decay_info)
+        self.surfaces = self.add_models(
+            read_surface_model, "surface_files", "default_surface", "surface", prepare_surface
         )
-        self._frames = frames.Frames(self, self.values)
-        self._inputs = PlanarInputs(self.values, self._frames, self.report)
+        self._frames = frames.Frames(self, self.values, buffer)
+        self.input = PlanarInput(self.values, self._frames, self.report)
         self._onset: Onset | None = None
         self._forecast_time = 0
         self._forecast_samples = 0
-        self._forecasts = self.add_output(DecayForecast, "forecast", latched=True)
+        self._forecasts = self.endpoints.add_output(
+            DecayForecast, "forecast", latched=True, unbounded=("bounds", "end_time")
+        )
         self._stream = OnsetStream(
             self,
-            self.add_output(WrenchStamped, "wrench", depth=100),
-            self.add_output(Vector3Stamped, "value", depth=100),
+            self.endpoints.add_output(WrenchStamped, "wrench", depth=100),
+            self.endpoints.add_output(Vector3Stamped, "value", depth=100),
             self._correct_forecast,
             self._forget_measurements,
         )
-        self.values.concern(["rate", "stop_below"], self._prepare_stream)
-        self.add_input(WrenchStamped, "onset", self._begin, stream=False)
-        self.add_input(WrenchStamped, "measurement", self._measure)
-        self.add_service(ListDecays, "list_models", self._list_models)
-        self.add_service(EvaluateDecay, "evaluate", self._evaluate)
-        self.add_service(TimeToLevel, "time_to_level", self._time_to_level)
-        self.add_service(PredictStop, "predict_stop", self._predict_stop)
+        self.values.on_change(["rate", "stop_below"], self._prepare_stream)
+        self.endpoints.add_input(WrenchStamped, "onset", self._begin, stream=False)
+        self.endpoints.add_input(WrenchStamped, "measurement", self._measure)
+        for service in SERVICES:
+            self.endpoints.serve(service)
 
     def describe(self) -> dict[str, str]:
         """Return what diagnostics say beside counts and times."""
-        told = super().describe() | {"surface": self._surfaces.models.default}
+        told = super().describe() | {"surface": self.surfaces.models.default}
         onset = self._onset
         if onset is None:
             return told | {"onset": "none yet"}
@@ -176,7 +195,7 @@ class DecayNode(ModelNode[DecayModel]):
                 "only its forecast is published",
             )
 
-    def _measure(self, message: WrenchStamped) -> None:
+    async def _measure(self, message: WrenchStamped) -> None:
         load = np.array(convert.wrench_components(message.wrench))
         onset = self._onset
         if onset is None or not self._stream.running:
@@ -189,7 +208,10 @@ class DecayNode(ModelNode[DecayModel]):
             )
         if stamp < onset.start:
             return
-        transform = self._frames.to_model(onset.message.header.frame_id, message.header)
+        transform = await self._frames.to_frame(onset.message.header.frame_id, message.header)
+        if self._onset is not onset:
+            # Another came while this one's measurement waited for its transform.
+            return
         if transform is not None:
             load = transform.wrench(load)
         if not onset.response.learn((stamp - onset.start) * 1e-9, onset.fraction(load)):
@@ -248,41 +270,81 @@ class DecayNode(ModelNode[DecayModel]):
     def _prepare_stream(self, values: Mapping[str, Any]) -> Callable[[], None]:
         return self._start_stream
 
-    def _list_models(self, _: ListDecays.Request, response: ListDecays.Response) -> None:
-        response.models = self._listing.of(self.models.models)
-
-    def _evaluate(self, request: EvaluateDecay.Request, response: EvaluateDecay.Response) -> None:
-        model = self.models[request.model]
-        response.values = convert.flat_of(model.sum(np.asarray(request.times)))
-        response.bound = model.max_error
-        response.bound_from, response.bound_until = model.time_span
-
-    def _time_to_level(self, request: TimeToLevel.Request, response: TimeToLevel.Response) -> None:
-        response.time = self.models[request.model].sum.time_to_level(request.level)
-        response.reached = bool(np.isfinite(response.time))
-
-    def _predict_stop(self, request: PredictStop.Request, response: PredictStop.Response) -> None:
-        model, body = self.models[request.model], self._surfaces[request.surface]
-        load = self._inputs.wrench(body, request.wrench)
-        twist, load_factor = load.surface.twist_and_load_factor(load.vector)
-        factor = float(load_factor)
-        stop = holds_from(model.sum, factor, model.max_error)
-        # A load that goes to a constant may never let the body rest.
-        end = max(self.values["horizon"], stop.time if np.isfinite(stop.time) else 0.0)
-        times = np.linspace(0.0, end, self.values["forecast_points"])
-        response.slides = stop.slides
-        response.load_factor = factor
-        response.stop_time = stop.time
-        response.earliest_stop_time = stop.earliest
-        response.latest_stop_time = stop.latest
-        convert.fill_twist(response.twist.twist, twist)
-        response.twist.header.stamp = request.wrench.header.stamp
-        response.twist.header.frame_id = body.frame_id
-        response.times = convert.flat_of(times)
-        response.load_factors = convert.flat_of(factor * model.sum(times) / onset_value(model.sum))
+    def list_models(self, _: ListDecays.Request, response: ListDecays.Response) -> None:
+        """Answer `~/list_models`."""
+        response.models = self._list.infos(self.models.models)
 
     def _now(self) -> int:
         return int(self.get_clock().now().nanoseconds)
+
+
+def describe_model(
+    node: DecayNode, request: DescribeModel.Request, response: DescribeModel.Response
+) -> None:
+    """Answer `~/describe_model`."""
+    model = node.models[request.model]
+    response.name = model.name
+    response.summary = model_info.decay_summary(model)
+    response.fit = model_info.provenance(model)
+
+
+def evaluate(
+    node: DecayNode, request: EvaluateDecay.Request, response: EvaluateDecay.Response
+) -> None:
+    """Answer `~/evaluate`."""
+    model, most = node.models[request.model], node.values["max_times"]
+    if len(request.times) > most:
+        raise RangeError(
+            f"times holds {len(request.times)} times; at most {most} are accepted, see max_times"
+        )
+    response.values = convert.flat_of(model.sum(np.asarray(request.times)))
+    response.bound = model.max_error
+    response.bound_from, response.bound_until = model.time_span
+
+
+def time_to_level(
+    node: DecayNode, request: TimeToLevel.Request, response: TimeToLevel.Response
+) -> None:
+    """Answer `~/time_to_level`."""
+    response.time = node.models[request.model].sum.time_to_level(request.level)
+    response.reached = bool(np.isfinite(response.time))
+
+
+async def predict_stop_of_a_body(
+    node: DecayNode, request: PredictStop.Request, response: PredictStop.Response
+) -> None:
+    """Answer `~/predict_stop`."""
+    model, body = node.models[request.model], node.surfaces[request.surface]
+    surface, wrench, frame = await node.input.wrench(body, request.wrench)
+    twist, load_factor = surface.twist_and_load_factor(wrench)
+    factor = float(load_factor)
+    stop = holds_from(model.sum, factor, model.max_error)
+    # A load that goes to a constant may never let the body rest.
+    end = max(node.values["horizon"], stop.time if np.isfinite(stop.time) else 0.0)
+    times = np.linspace(0.0, end, node.values["forecast_points"])
+    response.slides = stop.slides
+    response.load_factor = factor
+    response.stop_time = stop.time
+    response.earliest_stop_time = stop.earliest
+    response.latest_stop_time = stop.latest
+    convert.fill_twist(response.twist.twist, twist_at_origin(body, twist))
+    convert.fill_header(response.twist.header, request.wrench.header, frame)
+    response.times = convert.flat_of(times)
+    response.load_factors = convert.flat_of(factor * model.sum(times) / onset_value(model.sum))
+
+
+SERVICES = (
+    Service(ListDecays, "list_models", DecayNode.list_models),
+    Service(DescribeModel, "describe_model", describe_model),
+    Service(EvaluateDecay, "evaluate", evaluate),
+    Service(TimeToLevel, "time_to_level", time_to_level, unbounded=("time",)),
+    Service(
+        PredictStop,
+        "predict_stop",
+        predict_stop_of_a_body,
+        unbounded=("stop_time", "earliest_stop_time", "latest_stop_time"),
+    ),
+)
 
 
 def main() -> int:

@@ -13,7 +13,7 @@ from limit_surface_interfaces.srv import EvaluateDecay, PredictStop
 from rclpy.qos import QoSProfile
 
 from limit_surface_ros.nodes import convert
-from limit_surface_ros.nodes.stamps import nanoseconds
+from limit_surface_ros.nodes.convert import nanoseconds
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -28,7 +28,7 @@ from limit_surface_ros.nodes.diagnostics import Health, InputAge
 from limit_surface_ros.nodes.peers import LostMessages
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine, Generator, Iterator
+    from collections.abc import Callable, Generator, Iterator
 
     from rclpy.node import Node
     from rclpy.publisher import Publisher
@@ -116,6 +116,10 @@ class Output(NamedTuple):
         self.check(message)
         self.publisher.publish(message)
 
+    def get_subscription_count(self) -> int:
+        """Return how many listen."""
+        return int(self.publisher.get_subscription_count())
+
 
 class Endpoints:
     """The guarded services, inputs and outputs of one node.
@@ -158,9 +162,7 @@ class Endpoints:
             callback_group=self._group,
         )
 
-    def serve_trigger(
-        self, name: str, handler: Callable[[Any, Any], Any], unchanged: str
-    ) -> None:
+    def serve_trigger(self, name: str, handler: Callable[[Any, Any], Any], unchanged: str) -> None:
         """Serve `~/name` of type std_srvs/Trigger, whose answers hold no error code.
 
         Args:
@@ -228,7 +230,13 @@ class Endpoints:
         self._peers.watch_input(f"~/{name}", subscription)
 
     def add_output(
-        self, message_type: Any, name: str, *, latched: bool = False, depth: int = DEPTH
+        self,
+        message_type: Any,
+        name: str,
+        *,
+        latched: bool = False,
+        depth: int = DEPTH,
+        unbounded: tuple[str, ...] = (),
     ) -> Output:
         """Publish `~/name`, reliable.
 
@@ -237,6 +245,7 @@ class Endpoints:
             name: Name of the topic, without `~/`.
             latched: Whether who subscribes later gets the last message.
             depth: Number of messages that are kept for slow subscribers; 1 if latched.
+            unbounded: Fields that may be infinite, by their dotted names.
         """
         durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
         publisher = self._node.create_publisher(
@@ -247,7 +256,7 @@ class Endpoints:
             qos_overriding_options=QoSOverridingOptions.with_default_policies(),
         )
         self._peers.watch_output(f"~/{name}", publisher)
-        return Output(publisher, answers.FiniteCheck(message_type))
+        return Output(publisher, answers.FiniteCheck(message_type, unbounded))
 
     async def give_way(self) -> None:
         """Let whatever else is due have its turn."""

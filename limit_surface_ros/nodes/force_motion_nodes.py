@@ -9,15 +9,16 @@ from __future__ import annotations
 
 import sys
 
-from limit_surface_ros.nodes import decay_node, spin, surface_node
+from limit_surface_ros.nodes import decay_node, limit_surface_node, spin
 from limit_surface_ros.nodes.decay_node import DecayNode
+from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
 from limit_surface_ros.nodes.model_node import COMMON_SETTINGS
-from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
 
 
 def main() -> int:
     """Run both nodes until SIGINT or SIGTERM; return the exit code."""
-    tables = {node.NAME: [*node.SETTINGS, *COMMON_SETTINGS] for node in (surface_node, decay_node)}
+    modules = limit_surface_node, decay_node
+    tables = {module.NAME: [*module.SETTINGS, *COMMON_SETTINGS] for module in modules}
     return spin.run(lambda: [LimitSurfaceNode(), DecayNode()], tables, __doc__, sys.argv)
 
 

@@ -19,7 +19,14 @@ from limit_surface_interfaces.srv import (
 
 from limit_surface_ros.files.surface_file import SurfaceModel, read_surface_model
 from limit_surface_ros.motion.push import ContactMode, push
-from limit_surface_ros.nodes import convert, frames, model_info, planar_input, spin, surface_markers
+from limit_surface_ros.nodes import (
+    convert,
+    frames,
+    model_info,
+    planar_input,
+    spin,
+    surface_markers,
+)
 from limit_surface_ros.nodes.batches import Batches, empty_rows
 from limit_surface_ros.nodes.endpoints import Service
 from limit_surface_ros.nodes.frames import Frames
@@ -28,6 +35,7 @@ from limit_surface_ros.nodes.model_info import ModelList
 from limit_surface_ros.nodes.model_node import COMMON_SETTINGS, ModelNode
 from limit_surface_ros.nodes.planar_input import (
     PlanarInput,
+    prepare_surface,
     rows_at_origin,
     twist_at_origin,
     wrench_at_origin,
@@ -37,8 +45,6 @@ from limit_surface_ros.nodes.surface_markers import SurfaceMarkers
 from limit_surface_ros.surface.frames import power
 
 if TYPE_CHECKING:
-    from std_msgs.msg import Header
-
     from limit_surface_ros.surface.base import LimitSurface
 
 NAME = "limit_surface"
@@ -121,7 +127,7 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
         if surface.load_factor(wrench) >= 1.0:
             twist = surface.twist_of_wrench(wrench)
             convert.fill_twist(answer.twist, twist_at_origin(model, twist))
-        fill_header(answer.header, message.header, frame)
+        convert.fill_header(answer.header, message.header, frame)
         self._twists.publish(answer)
 
     async def _require(self, message: TwistStamped) -> None:
@@ -130,7 +136,7 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
         answer = WrenchStamped()
         wrench = surface.wrench_of_twist(twist)
         convert.fill_wrench(answer.wrench, wrench_at_origin(model, wrench))
-        fill_header(answer.header, message.header, frame)
+        convert.fill_header(answer.header, message.header, frame)
         self._wrenches.publish(answer)
 
 
@@ -148,7 +154,7 @@ async def wrench_to_twist(
     response.load_factor = float(factor)
     response.slides = bool(factor >= 1.0)
     for stamped in (response.twist, response.limit_wrench):
-        fill_header(stamped.header, request.wrench.header, frame)
+        convert.fill_header(stamped.header, request.wrench.header, frame)
 
 
 async def twist_to_wrench(
@@ -160,7 +166,7 @@ async def twist_to_wrench(
     wrench = surface.wrench_of_twist(twist)
     convert.fill_wrench(response.wrench.wrench, wrench_at_origin(model, wrench))
     response.power = float(wrench @ twist)
-    fill_header(response.wrench.header, request.twist.header, frame)
+    convert.fill_header(response.wrench.header, request.twist.header, frame)
 
 
 async def wrenches_to_twists(
@@ -174,8 +180,8 @@ async def wrenches_to_twists(
     there = await node.input.rows_matrix("wrench", model, request.header)
     back = rows_at_origin("twist", model)
     surface = policy.surface_of(model)
-    response.twists, twists = empty_rows(len(rows), 3)
-    response.load_factors, factors = empty_rows(len(rows), 1)
+    flat_twists, twists = empty_rows(len(rows), 3)
+    flat_factors, factors = empty_rows(len(rows), 1)
 
     def work(part: slice) -> None:
         wrenches = convert.checked_rows("wrenches", rows[part], part.start)
@@ -184,7 +190,8 @@ async def wrenches_to_twists(
         twists[part] = found if back is None else found @ back
 
     await node.batches.run(len(rows), work)
-    fill_header(response.header, request.header, policy.frame_of(model))
+    response.twists, response.load_factors = flat_twists, flat_factors
+    convert.fill_header(response.header, request.header, policy.frame_of(model))
 
 
 async def twists_to_wrenches(
@@ -198,8 +205,8 @@ async def twists_to_wrenches(
     there = await node.input.rows_matrix("twist", model, request.header)
     back = rows_at_origin("wrench", model)
     surface = policy.surface_of(model)
-    response.wrenches, wrenches = empty_rows(len(rows), 3)
-    response.powers, powers = empty_rows(len(rows), 1)
+    flat_wrenches, wrenches = empty_rows(len(rows), 3)
+    flat_powers, powers = empty_rows(len(rows), 1)
 
     def work(part: slice) -> None:
         twists = convert.checked_rows("twists", rows[part], part.start)
@@ -209,7 +216,8 @@ async def twists_to_wrenches(
         wrenches[part] = found if back is None else found @ back
 
     await node.batches.run(len(rows), work)
-    fill_header(response.header, request.header, policy.frame_of(model))
+    response.wrenches, response.powers = flat_wrenches, flat_powers
+    convert.fill_header(response.header, request.header, policy.frame_of(model))
 
 
 async def push_at_a_point(
@@ -223,7 +231,7 @@ async def push_at_a_point(
     convert.fill_wrench(response.wrench.wrench, wrench_at_origin(model, pushed.wrench))
     response.mode = MODES[pushed.mode]
     for stamped in (response.twist, response.wrench):
-        fill_header(stamped.header, request.header, policy.frame_of(model))
+        convert.fill_header(stamped.header, request.header, policy.frame_of(model))
 
 
 SERVICES = (
@@ -235,19 +243,6 @@ SERVICES = (
     Service(ListModels, "list_models", LimitSurfaceNode.list_models),
     Service(DescribeModel, "describe_model", LimitSurfaceNode.describe_model),
 )
-
-
-def fill_header(header: Header, asked: Header, frame: str) -> None:
-    """Answers keep the stamp that they answer and stand in the model's frame."""
-    header.stamp = asked.stamp
-    header.frame_id = frame
-
-
-def prepare_surface(model: SurfaceModel) -> None:
-    """Do ahead what the first requests would have to wait for."""
-    prepare = getattr(model.surface, "prepare", None)
-    if prepare is not None:
-        prepare()
 
 
 def main() -> int:

@@ -142,8 +142,8 @@ class ModelHost(Generic[Model]):
         except UnknownModelError as error:
             names = " and ".join(self.names)
             raise UnknownModelError(
-                f"{self.names[1]}: {error}; set {names} in one request, as `ros2 param load` does, "
-                f"or {self.names[1]} to '' first"
+                f"{self.names[1]}: {error}; set {names} in one request, as `ros2 param load` "
+                f"does, or {self.names[1]} to '' first"
             ) from None
 
     def _start_preparing(self, models: ModelSet[Model]) -> None:
@@ -155,9 +155,7 @@ class ModelHost(Generic[Model]):
         )
         self._thread.start()
 
-    def _prepare_all(
-        self, models: ModelSet[Model], prepare: Callable[[Model], object]
-    ) -> None:
+    def _prepare_all(self, models: ModelSet[Model], prepare: Callable[[Model], object]) -> None:
         default = models[""]
         for model in [default, *(model for model in models if model is not default)]:
             if self._preparing is not models:

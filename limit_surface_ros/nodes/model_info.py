@@ -86,7 +86,11 @@ def surface_summary(model: SurfaceModel, frame: str) -> str:
         f"limit_along_y: [{limits[4, 1]:.6g}, {limits[1, 1]:.6g}]  # [N]",
         f"largest_moment: {limits[2, 2]:.6g}  # about the reference point [N m]",
         "normal_force: "
-        + ("null  # not stated" if model.normal_force is None else f"{model.normal_force:.6g}  # [N]"),
+        + (
+            "null  # not stated"
+            if model.normal_force is None
+            else f"{model.normal_force:.6g}  # [N]"
+        ),
         f"convex: {str(model.convexity.convex).lower()}",
     ]
     return "\n".join(lines)

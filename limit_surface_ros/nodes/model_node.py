@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the nodes of this package share: parameters, models, guarded endpoints, diagnostics.
 
-A node built on `ModelNode` declares services (`endpoints.Service`) and adds inputs and outputs with
-handlers that convert, call the core and convert back.
+A node built on `ModelNode` declares services (`endpoints.Service`) and adds inputs and outputs
+with handlers that convert, call the core and convert back.
 """
 
 from __future__ import annotations
@@ -64,16 +64,14 @@ class ModelNode(Node, Generic[Model]):
         """Declare parameters, read models, start diagnostics."""
         super().__init__(name, **options)
         self._hosts: list[ModelHost[Any]] = []
+        self.health = diagnostics.Health()
         try:
             self.values = Parameters(self, [*settings, *COMMON_SETTINGS])
-            self.models = ModelHost(
-                self.values, read, self.get_logger().warning, prepare=prepare
-            )
+            self.models = ModelHost(self.values, read, self.get_logger().warning, prepare=prepare)
         except Exception:
             self.destroy_node()
             raise
         self._hosts.append(self.models)
-        self.health = diagnostics.Health()
         peers = Peers(self)
         self.endpoints = Endpoints(self, self.health, peers)
         self.endpoints.serve_trigger("reload", self._reload, "the old models keep serving")
@@ -123,8 +121,8 @@ class ModelNode(Node, Generic[Model]):
 
     def destroy_node(self) -> None:
         """Stop what runs beside the node, and the node."""
-        for host in self._hosts:
-            host.close()
+        for part in (*self._hosts, *self.health.lost.values()):
+            part.close()
         super().destroy_node()
 
     async def _reload(self, _: Trigger.Request, response: Trigger.Response) -> None:

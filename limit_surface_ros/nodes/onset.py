@@ -10,7 +10,7 @@ import numpy as np
 from limit_surface_ros.decay.response import Response
 from limit_surface_ros.errors import ZeroVectorError
 from limit_surface_ros.nodes import convert
-from limit_surface_ros.nodes.stamps import fill_stamp, nanoseconds
+from limit_surface_ros.nodes.convert import fill_stamp, nanoseconds
 
 if TYPE_CHECKING:
     from geometry_msgs.msg import WrenchStamped
@@ -40,7 +40,7 @@ class Onset:
 
     Raises:
         NotFiniteError: A component is NaN or infinite.
-        RangeError: A component is out of this world, or the stamp is before time zero.
+        RangeError: A component is larger than 1e100, or the stamp is before time zero.
         ZeroVectorError: The load is zero.
         NoOnsetError: The model starts at zero.
     """

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,17 +11,70 @@ from geometry_msgs.msg import Vector3Stamped, WrenchStamped
 from rclpy.clock import JumpThreshold
 from rclpy.duration import Duration
 
-from limit_surface_ros.nodes.schedule import Schedule
-from limit_surface_ros.nodes.stamps import fill_stamp
+from limit_surface_ros.nodes.convert import fill_stamp
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from geometry_msgs.msg import Wrench
     from rclpy.node import Node
-    from rclpy.publisher import Publisher
 
+    from limit_surface_ros.nodes.endpoints import Output
     from limit_surface_ros.nodes.onset import Onset
+
+
+# What has been due for longer was missed: a stalled process does not flood its listeners [ns].
+LONGEST_DELAY = 1_000_000_000
+
+
+class Schedule:
+    """Stamps start + k / rate of one stream, counted and not added up, in integer nanoseconds.
+
+    A timer that fires late, or a simulated clock that ticks coarsely, delays messages but neither
+    loses them nor shifts the stamps of those that follow.
+
+    Args:
+        start: Time of the first stamp [ns].
+        rate: Stamps a second [Hz].
+        now: Present time [ns]; stamps before it are not due any more.
+    """
+
+    def __init__(self, start: int, rate: float, now: int) -> None:
+        """Begin at the first stamp that is not past."""
+        self._start = start
+        self._rate = rate
+        self.restart(now)
+
+    def restart(self, now: int) -> None:
+        """Go on from the first stamp that is not before `now` [ns]: the clock has jumped."""
+        elapsed = now - self._start
+        self._next = max(0, math.ceil(elapsed * 1e-9 * self._rate))
+        # Rounding may have taken a stamp that is due just now for one that is past.
+        if self._next > 0 and self._offset(self._next - 1) >= elapsed:
+            self._next -= 1
+
+    @property
+    def next_offset(self) -> int:
+        """Time from the start to the stamp that is due next [ns]."""
+        return self._offset(self._next)
+
+    @property
+    def next_stamp(self) -> int:
+        """The stamp that is due next [ns]."""
+        return self._start + self.next_offset
+
+    def due(self, now: int) -> list[int]:
+        """Return the times from the start to all stamps that have come due [ns], each once."""
+        if now - self.next_stamp > LONGEST_DELAY:
+            self.restart(now)
+        offsets: list[int] = []
+        while self.next_stamp <= now:
+            offsets.append(self.next_offset)
+            self._next += 1
+        return offsets
+
+    def _offset(self, index: int) -> int:
+        return round(index * 1e9 / self._rate)
 
 
 class OnsetStream:
@@ -40,8 +94,8 @@ class OnsetStream:
     def __init__(
         self,
         node: Node,
-        wrenches: Publisher,
-        values: Publisher,
+        wrenches: Output,
+        values: Output,
         advanced: Callable[[int], None],
         jumped_back: Callable[[], None],
     ) -> None:

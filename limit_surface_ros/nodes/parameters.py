@@ -88,7 +88,7 @@ class Parameters:
             setting.verify(self._values[setting.name])
         _warn_of_unknown(node, self._settings)
         self._locked = bool(self._values[LOCKED])
-        # Values of another type than the parameter's, since rclpy would refuse them in its own words.
+        # Values of another type than the parameter's: rclpy would refuse them in its own words.
         self._mistyped: dict[str, Any] = {}
         node.add_pre_set_parameters_callback(self._fit_types)
         node.add_on_set_parameters_callback(self._prepare)

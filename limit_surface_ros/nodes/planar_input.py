@@ -17,7 +17,7 @@ from limit_surface_ros.checks import shortened
 from limit_surface_ros.errors import RangeError
 from limit_surface_ros.nodes import convert
 from limit_surface_ros.nodes.settings import Setting
-from limit_surface_ros.surface.frames import out_of_plane
+from limit_surface_ros.surface.frames import RigidTransform, out_of_plane
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -280,14 +280,29 @@ class PlanarInput:
         normal = convert.vector_components("normal", request.normal)
         velocity = convert.vector_components("velocity", request.velocity)
         friction = convert.checked_number("friction", request.friction)
-        frame = self.policy.frame_of(model)
-        if request.header.frame_id and request.header.frame_id != frame:
-            transform = await self._frames.to_frame(frame, request.header)
-            point = transform.point(point).tolist()
-            normal = transform.direction(normal).tolist()
-            velocity = transform.direction(velocity).tolist()
+        transform = await self.transform(model, request.header)
+        point = transform.point(point).tolist()
+        normal = transform.direction(normal).tolist()
+        velocity = transform.direction(velocity).tolist()
+        return point[:2], normal[:2], friction, velocity[:2]
+
+    async def transform(self, model: SurfaceModel, header: Header) -> RigidTransform:
+        """Return the transform from a header's frame to axes at a model's reference point.
+
+        Args:
+            model: The model.
+            header: Of what was asked; an empty frame is the model's.
+
+        Raises:
+            FrameError: No transform to the model's frame is known.
+        """
         x, y = model.reference_point
-        return (point[0] - x, point[1] - y), normal[:2], friction, velocity[:2]
+        moved = RigidTransform(np.eye(3), np.array([-x, -y, 0.0]))
+        frame = self.policy.frame_of(model)
+        if not header.frame_id or header.frame_id == frame:
+            return moved
+        transform = await self._frames.to_frame(frame, header)
+        return moved if transform is None else moved @ transform
 
     def _report_share(self, what: str, share: float) -> None:
         self._report(
@@ -303,6 +318,13 @@ class PlanarInput:
             self.policy = policy
 
         return apply
+
+
+def prepare_surface(model: SurfaceModel) -> None:
+    """Do ahead what the first requests would have to wait for."""
+    prepare = getattr(model.surface, "prepare", None)
+    if prepare is not None:
+        prepare()
 
 
 def wrench_at_origin(model: SurfaceModel, wrench: Sequence[float]) -> tuple[float, ...]:

@@ -80,7 +80,9 @@ class Setting:
             if self.maximum is not None and number > self.maximum:
                 raise RangeError(f"{self.name} must be at most {self.maximum}, got {number}")
         if self.choices and value not in self.choices:
-            raise RangeError(f"{self.name} must be {self.constraints}; got {shortened(repr(value))}")
+            raise RangeError(
+                f"{self.name} must be {self.constraints}; got {shortened(repr(value))}"
+            )
         if self.check is not None:
             try:
                 self.check(value)

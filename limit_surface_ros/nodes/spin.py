@@ -12,6 +12,7 @@ import argparse
 import os
 import signal
 import socket
+import sys
 import threading
 import time
 import traceback
@@ -31,9 +32,10 @@ from limit_surface_ros.nodes.settings import Setting, help_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
-    from rclpy.node import Node
+    from limit_surface_ros.nodes.endpoints import Endpoints
+    from limit_surface_ros.nodes.model_node import ModelNode
 
-ENDING = (signal.SIGINT, signal.SIGTERM)
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # What a user gets wrong at start is told in one line, without a traceback. rcl's errors, unknown
 # ROS arguments among them, are RuntimeErrors.
 _CONFIGURATION_ERRORS = (LimitSurfaceError, ParameterException, RuntimeError)
@@ -48,9 +50,16 @@ _ADDRESSED = (
 )
 # What names the folder of the log, for rcl.
 _HOMES = ("ROS_LOG_DIR", "ROS_HOME", "HOME")
+# Requests may be on their way: so long after the last one [s], and no longer in all, a node that
+# ends refuses what comes.
+QUIET, LONGEST_END = 0.2, 5.0
+# Threads that prepare models give way to the node this often [s].
+SWITCH_INTERVAL = 5e-4
 # The middleware is still sending a large answer when the call is over; it is lost if the node is
 # gone before [s].
 TIME_TO_SEND = 0.3
+_LONG = 3600.0
+_LAST_STANDARD = 2
 EXECUTOR = Setting(
     "executor",
     "single_threaded",
@@ -62,7 +71,7 @@ EXECUTOR = Setting(
 
 
 def run(
-    make_nodes: Callable[[], Sequence[Node]],
+    make_nodes: Callable[[], Sequence[ModelNode[Any]]],
     tables: Mapping[str, Iterable[Setting]],
     description: str,
     argv: Sequence[str],
@@ -77,15 +86,19 @@ def run(
         argv: The command line, the program's name first.
 
     Returns:
-        The process's exit code: 0 after SIGINT or SIGTERM, 1 if the nodes could not start, be it
-        because they ask for different executors.
+        The process's exit code: 0 after SIGINT, SIGTERM or SIGHUP, 1 if the nodes could not
+        start, be it because they ask for different executors.
     """
+    _open_standard_streams()
+    sys.setswitchinterval(SWITCH_INTERVAL)
     # Whichever thread the kernel picks (OpenBLAS has some of its own), Python writes to this end.
     woken, wakes = socket.socketpair()
     wakes.setblocking(False)
     signal.set_wakeup_fd(wakes.fileno())
     for number in ENDING:
-        signal.signal(number, lambda *_: None)
+        # Under nohup a process is to outlive its terminal.
+        if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, lambda *_: None)
     parser = argparse.ArgumentParser(
         description=description,
         epilog="\n\n".join([_EPILOG, *(help_of(name, table) for name, table in tables.items())]),
@@ -114,6 +127,7 @@ def run(
     for node in nodes:
         executor.add_node(node)
     _spin_until_woken(executor, woken, wakes)
+    _answer_what_waits(executor, [node.endpoints for node in nodes])
     time.sleep(TIME_TO_SEND)
     executor.shutdown()
     for node in nodes:
@@ -122,7 +136,7 @@ def run(
     return 0
 
 
-def _executor(nodes: Sequence[Node]) -> Executor:
+def _executor(nodes: Sequence[ModelNode[Any]]) -> Executor:
     """Make the executor that the nodes ask for.
 
     Raises:
@@ -149,6 +163,25 @@ def _executor(nodes: Sequence[Node]) -> Executor:
     return SingleThreadedExecutor()
 
 
+def _open_standard_streams() -> None:
+    """Open those that were closed: else other files get their numbers, and the log with them."""
+    while (number := os.open(os.devnull, os.O_RDWR)) <= _LAST_STANDARD:
+        pass
+    os.close(number)
+
+
+def _answer_what_waits(executor: Executor, endpoints: Sequence[Endpoints]) -> None:
+    """Finish answers that have begun, and refuse what has come or still comes."""
+    for each in endpoints:
+        each.end()
+    start = time.monotonic()
+    while (now := time.monotonic()) - start < LONGEST_END:
+        last = max(start, *(each.last_request for each in endpoints))
+        if now - last > QUIET and not any(each.under_way for each in endpoints):
+            break
+        _spin_guarded(executor, 0.05)
+
+
 def _spin_until_woken(executor: Executor, woken: socket.socket, wakes: socket.socket) -> None:
     ended: Any = Future()
 
@@ -160,22 +193,28 @@ def _spin_until_woken(executor: Executor, woken: socket.socket, wakes: socket.so
     waiter = threading.Thread(target=wait, daemon=True)
     waiter.start()
     while rclpy.ok() and not ended.done():
-        try:
-            _turn(executor, ended)
-        except Exception:
-            # A message that rclpy itself cannot convert must not end a node that serves others.
-            rclpy.logging.get_logger("limit_surface_ros").error(
-                f"while spinning: {traceback.format_exc()}", throttle_duration_sec=5.0
-            )
+        _spin_guarded(executor, None, ended)
     # If the context was shut down from elsewhere, the thread still waits.
     wakes.send(b"\0")
     waiter.join()
 
 
-def _turn(executor: Executor, ended: Any) -> None:
-    if isinstance(executor, SingleThreadedExecutor):
-        # Its spin_until_future_complete would leave a callback behind at each turn.
-        executor.spin_once()
-    else:
-        # Without a timeout the EventsExecutor of rclpy 7.1.6 turns hot and deaf.
-        executor.spin_until_future_complete(ended, timeout_sec=3600.0)
+def _spin_guarded(executor: Executor, timeout: float | None, until: Any = None) -> None:
+    """Let the executor do something; what rclpy itself raises must not end a node.
+
+    It cannot convert some messages, such as texts that are not UTF-8.
+    """
+    try:
+        if isinstance(executor, SingleThreadedExecutor):
+            # Its spin_until_future_complete would leave a callback behind at each turn.
+            executor.spin_once(timeout)
+        else:
+            # Without a timeout the EventsExecutor of rclpy 7.1.6 turns hot and deaf.
+            executor.spin_until_future_complete(
+                Future() if until is None else until,
+                timeout_sec=_LONG if timeout is None else timeout,
+            )
+    except Exception:
+        rclpy.logging.get_logger("limit_surface_ros").error(
+            f"while spinning: {traceback.format_exc()}", throttle_duration_sec=5.0
+        )

@@ -68,8 +68,8 @@ class StaticTransforms:
         target_root, target_pose = self._in_root[target]
         if source_root != target_root:
             raise FrameError(
-                f"no transform from frame {_shown(source)} to the model's frame {_shown(target)} is "
-                "known: no chain of static transforms joins them"
+                f"no transform from frame {_shown(source)} to the model's frame {_shown(target)} "
+                "is known: no chain of static transforms joins them"
             )
         return target_pose.inverse @ source_pose
 

@@ -80,15 +80,13 @@ class SurfaceMarkers:
         self._timer = node.create_timer(1.0, self._update)
         node.values.on_change(["marker_rate"], self._prepare_timer)
 
-    def note(
-        self, model: SurfaceModel, surface: LimitSurface, wrench: Floats, frame: str
-    ) -> None:
+    def note(self, model: SurfaceModel, surface: LimitSurface, wrench: Floats, frame: str) -> None:
         """Remember the last load; it costs nothing while nobody looks."""
         self._load = Load(model, surface, wrench, frame)
         self._load_is_new = True
 
     def _update(self) -> None:
-        watchers = self._output.publisher.get_subscription_count()
+        watchers = self._output.get_subscription_count()
         joined, self._watchers = watchers > self._watchers, watchers
         if not watchers:
             return

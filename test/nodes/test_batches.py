@@ -15,7 +15,7 @@ from limit_surface_interfaces.msg import ErrorCode
 from limit_surface_interfaces.srv import TwistsToWrenches, WrenchesToTwists
 
 from limit_surface_ros.nodes import convert
-from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
+from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from limit_surface_interfaces.srv import WrenchToTwist
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
 
-from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
+from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
 from node_helpers import wrench_message
 
 
@@ -167,7 +167,7 @@ def test_a_subscriber_that_gets_nothing_is_told_of_until_it_goes(
     seen = watch()
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     deaf = stranger.create_subscription(kind, f"/limit_surface/{topic}", lambda _: None, latched)
-    told = f"/stranger gets or gives nothing on ~/{topic}"
+    told = f"/stranger cannot communicate on ~/{topic}"
     seen.wait(lambda: seen.status.message.startswith(told))
     assert seen.status.level == DiagnosticStatus.WARN
     assert seen.values["mismatched peers"] == "1"
@@ -179,10 +179,10 @@ def test_a_subscriber_that_gets_nothing_is_told_of_until_it_goes(
 
 def test_a_second_node_of_the_same_name_is_told_of(stranger, watch):
     seen = watch()
-    seen.wait(lambda: seen.values.get("namesakes") == "0")
+    seen.wait(lambda: seen.values.get("duplicates") == "0")
     other = rclpy.create_node("limit_surface", context=stranger.context)
     try:
-        seen.wait(lambda: seen.values.get("namesakes") == "1")
+        seen.wait(lambda: seen.values.get("duplicates") == "1")
         assert seen.status.level == DiagnosticStatus.WARN
         assert "1 other node(s) named /limit_surface" in seen.status.message
     finally:

@@ -30,7 +30,7 @@ from rclpy.serialization import serialize_message
 
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
 from limit_surface_ros.nodes import convert
-from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
+from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.scaling import Scaling
 from node_helpers import Program, planar_twist, wrench_message
@@ -80,8 +80,8 @@ def twists(draw):
 @st.composite
 def pushes(draw):
     asked = Push.Request(model=draw(texts), friction=draw(numbers))
-    asked.contact.header.frame_id = draw(texts)
-    for vector in (asked.contact.point, asked.normal, asked.velocity):
+    asked.header.frame_id = draw(texts)
+    for vector in (asked.contact, asked.normal, asked.velocity):
         vector.x, vector.y, vector.z = draw(numbers), draw(numbers), draw(numbers)
     return asked
 

@@ -14,11 +14,19 @@ pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not b
 
 from geometry_msgs.msg import TransformStamped
 from limit_surface_interfaces.msg import ErrorCode
-from limit_surface_interfaces.srv import TwistToWrench, WrenchToTwist
+from limit_surface_interfaces.srv import (
+    ListModels,
+    TwistsToWrenches,
+    TwistToWrench,
+    WrenchesToTwists,
+    WrenchToTwist,
+)
 from rclpy.parameter import Parameter
+from std_msgs.msg import Header
 
-from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
-from node_helpers import planar_twist, planar_wrench, twist_message, wrench_message
+from limit_surface_ros.nodes import convert
+from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
+from node_helpers import STAMP, planar_twist, planar_wrench, twist_message, wrench_message
 
 TOOL = "object tool 0.1 0.02 0.3 0 0 0.5"
 
@@ -78,20 +86,108 @@ def test_a_twist_at_the_tool_is_moved_to_the_object(serve):
     )
 
 
-def test_other_frames_are_moved_to_the_models_reference_point(serve):
-    model, _, forward, _ = serve(
-        {"static_transforms": ["object same 0 0 0 0 0 0"]}, reference_point=(0.1, -0.2)
+REFERENCE = (0.1, -0.2)
+
+
+def at_reference(wrench):
+    """A wrench at the origin of the model's frame, about the reference point, by hand."""
+    fx, fy, tau = wrench
+    return np.array([fx, fy, tau - (0.1 * fy - -0.2 * fx)])
+
+
+def at_origin(twist):
+    """A twist at the reference point, as it is at the origin of the model's frame, by hand."""
+    vx, vy, omega = twist
+    # v(0) = v(r) + omega x (0 - r)
+    return np.array([vx + omega * -0.2, vy - omega * 0.1, omega])
+
+
+@pytest.mark.parametrize("frame", ["object", "same"])
+def test_loads_and_answers_act_at_the_origin_of_their_frame_the_models_own_included(serve, frame):
+    model, _, forward, back = serve(
+        {"static_transforms": ["object same 0 0 0 0 0 0"]}, reference_point=REFERENCE
     )
     force = np.array([2.0, 3.0, 0.1])
-    own = forward(wrench_message(force))
+    answer = forward(wrench_message(force, frame=frame))
+    twist, factor = model.surface.twist_and_load_factor(at_reference(force))
+    np.testing.assert_allclose(planar_twist(answer.twist), at_origin(twist), rtol=1e-9)
+    assert answer.load_factor == pytest.approx(float(factor))
+    np.testing.assert_allclose(planar_wrench(answer.limit_wrench), force / factor, rtol=1e-9)
+    needed = back(answer.twist)
+    np.testing.assert_allclose(planar_wrench(needed.wrench), force / factor, rtol=1e-6)
+    work = planar_wrench(needed.wrench) @ planar_twist(answer.twist)
+    assert needed.power == pytest.approx(work, rel=1e-9)
+
+
+@pytest.mark.parametrize("frame", ["", "object", "same", "tool"])
+def test_the_rows_of_a_batch_act_where_single_ones_do(ros, client_node, serve, frame):
+    transforms = ["object same 0 0 0 0 0 0", TOOL]
+    _, _, forward, back = serve({"static_transforms": transforms}, reference_point=REFERENCE)
+    many = ros.client(client_node, WrenchesToTwists, "/limit_surface/wrenches_to_twists")
+    many_back = ros.client(client_node, TwistsToWrenches, "/limit_surface/twists_to_wrenches")
+    rows = np.random.default_rng(3).normal(size=(5, 3)) * [3.0, 3.0, 0.1]
+    header = Header(frame_id=frame, stamp=STAMP)
+    there = many(WrenchesToTwists.Request(header=header, wrenches=convert.flat_of(rows)))
+    needed = many_back(TwistsToWrenches.Request(header=header, twists=convert.flat_of(rows)))
+    for answer in (there, needed):
+        assert answer.error_code == ErrorCode.NONE, answer.error_msg
+        assert answer.header == Header(frame_id="object", stamp=STAMP)
+    for row, twist, factor, wrench, power in zip(
+        rows,
+        np.reshape(there.twists, (-1, 3)),
+        there.load_factors,
+        np.reshape(needed.wrenches, (-1, 3)),
+        needed.powers,
+        strict=True,
+    ):
+        one = forward(wrench_message(row, frame=frame or "object"))
+        np.testing.assert_allclose(planar_twist(one.twist), twist, rtol=1e-9, atol=1e-12)
+        assert one.load_factor == pytest.approx(factor)
+        one = back(twist_message(row, frame=frame or "object"))
+        np.testing.assert_allclose(planar_wrench(one.wrench), wrench, rtol=1e-9, atol=1e-12)
+        assert one.power == pytest.approx(power)
+
+
+def test_two_robots_and_a_perceived_object_need_no_other_files(ros, client_node, model_file):
+    model, path = model_file()
+    _, crate = model_file("crate", seed=1)
+    parameters = {"frame_prefix": "left/", "frame_ids": ["crate=box_12"]}
+    node = ros.add(LimitSurfaceNode, files=[path, crate], parameters=parameters)
+    forward = ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
+    listed = ros.client(client_node, ListModels, "/limit_surface/list_models")
+
+    def ask(name, frame):
+        asked = WrenchToTwist.Request(model=name, wrench=wrench_message([9, 0, 0], frame=frame))
+        return forward(asked)
+
+    answer = ask("box", "left/object")
+    assert answer.twist.header.frame_id == "left/object"
     np.testing.assert_allclose(
-        planar_twist(own.twist), model.surface.twist_of_wrench(force), atol=1e-12
+        planar_twist(answer.twist), model.surface.twist_of_wrench([9, 0, 0]), atol=1e-12
     )
-    other = forward(wrench_message(force, frame="same"))
-    moved = [2.0, 3.0, 0.1 - (0.1 * 3.0 - -0.2 * 2.0)]
-    np.testing.assert_allclose(
-        planar_twist(other.twist), model.surface.twist_of_wrench(moved), atol=1e-12
-    )
+    assert ask("box", "object").error_code == ErrorCode.UNKNOWN_FRAME
+    assert ask("crate", "box_12").twist.header.frame_id == "box_12"
+    frames = [info.frame_id for info in listed(ListModels.Request()).models]
+    assert frames == ["left/object", "box_12"]
+    node.set_parameters([Parameter("frame_prefix", value="right/")])
+    assert ask("box", "right/object").error_code == ErrorCode.NONE
+    frames = [info.frame_id for info in listed(ListModels.Request()).models]
+    assert frames == ["right/object", "box_12"]
+    for wrong in (["crate"], ["=a"], ["a="], ["a=b", "a=c"]):
+        assert not node.set_parameters([Parameter("frame_ids", value=wrong)])[0].successful
+
+
+def test_a_slash_before_a_frame_is_said_to_be_the_matter(serve):
+    _, _, forward, _ = serve({"static_transforms": [TOOL]})
+    assert "no slash: 'object'?" in forward(wrench_message([1, 0, 0], frame="/object")).error_msg
+
+
+def test_a_very_long_name_is_not_repeated_whole(serve):
+    _, node, forward, _ = serve()
+    answer = forward(wrench_message([1, 0, 0], frame="x" * 1_000_000))
+    assert answer.error_code == ErrorCode.UNKNOWN_FRAME
+    assert len(answer.error_msg) < 1000
+    assert len(node.health.last_error) < 1000
 
 
 def test_a_frame_without_a_transform_is_refused_with_both_named(serve):

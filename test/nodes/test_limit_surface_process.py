@@ -14,7 +14,8 @@ pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not b
 
 from limit_surface_interfaces.srv import WrenchToTwist
 
-from limit_surface_ros.nodes import decay_node, surface_node
+from limit_surface_ros.files.surface_file import read_surface_model
+from limit_surface_ros.nodes import decay_node, limit_surface_node
 from limit_surface_ros.nodes.model_node import COMMON_SETTINGS
 from node_helpers import Program, planar_twist, wrench_message
 
@@ -56,7 +57,7 @@ def test_another_process_is_served_until_a_signal_ends_it_cleanly(
         ("input_timeout:=.nan", "input_timeout"),
         ("normal_force_from:=moon", "normal_force_from"),
         ("static_transforms:=['a b 1 2']", "static_transforms"),
-        ("normal_force:=5", "normal_force must have a decimal point: write 5.0"),
+        ("model_files:=/box.yaml", "model_files must be a list of texts: write ['/box.yaml']"),
         ("out_of_plane_tolerance:=text", "out_of_plane_tolerance"),
     ],
 )
@@ -118,9 +119,9 @@ def test_help_teaches_how_to_give_parameters():
 @pytest.mark.parametrize(
     ("program", "tables"),
     [
-        ("limit_surface_node", [surface_node.SETTINGS]),
+        ("limit_surface_node", [limit_surface_node.SETTINGS]),
         ("decay_node", [decay_node.SETTINGS]),
-        ("force_motion_nodes", [surface_node.SETTINGS, decay_node.SETTINGS]),
+        ("force_motion_nodes", [limit_surface_node.SETTINGS, decay_node.SETTINGS]),
     ],
 )
 def test_help_lists_every_parameter_with_default_and_meaning(program, tables):
@@ -139,6 +140,18 @@ def test_a_model_file_without_its_parameter_is_told_how_to_be_given():
         code, output = program.ended()
     assert code == 2
     assert "-p \"model_files:=['model.yaml']\"" in output
+
+
+def test_a_whole_number_does_for_one_with_a_point(ros, client_node, model_file):
+    _, path = model_file(normal_force=10.0)
+    given = "-p", "normal_force_from:=parameter", "-p", "normal_force:=5"
+    with started(path, *given) as program:
+        call = ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
+        asked = WrenchToTwist.Request(wrench=wrench_message([3.0, 1.0, 0.1]))
+        factor = read_surface_model(path).surface.load_factor([3.0, 1.0, 0.1])
+        assert call(asked).load_factor == pytest.approx(2.0 * float(factor))
+        code, output = program.end()
+    assert code == 0, output
 
 
 def test_nodes_of_one_process_that_ask_for_different_executors_do_not_start():

@@ -17,7 +17,7 @@ from limit_surface_interfaces.msg import ErrorCode
 from limit_surface_interfaces.srv import ListModels, TwistToWrench, WrenchToTwist
 
 from limit_surface_ros.files.surface_file import read_surface_model
-from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
+from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
 from node_helpers import STAMP, planar_twist, planar_wrench, twist_message, wrench_message
 
 

@@ -17,7 +17,7 @@ from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
-from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
+from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
 from node_helpers import STAMP, planar_twist, planar_wrench, twist_message, wrench_message
 from process_helpers import WAIT
 

@@ -22,7 +22,7 @@ from limit_surface_ros.surface.scaling import Scaling
 
 SURFACE = PowerSum.norms([np.diag([1.0, 2.0, 0.5])], Scaling(0.05, 4.0))
 MODEL = SurfaceModel("box", SURFACE, frame_id="box", reference_point=(0.1, -0.2))
-CANVAS = Canvas(MODEL, 0.02)
+CANVAS = Canvas(MODEL, 0.02, MODEL.frame_id)
 
 
 def rows(marker):

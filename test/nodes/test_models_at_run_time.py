@@ -8,12 +8,13 @@ import warnings
 
 import numpy as np
 import pytest
+import yaml
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
 
 from limit_surface_interfaces.msg import ErrorCode
-from limit_surface_interfaces.srv import ListModels, WrenchToTwist
+from limit_surface_interfaces.srv import DescribeModel, ListModels, WrenchToTwist
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
@@ -22,8 +23,8 @@ from limit_surface_ros.files.surface_file import (
     read_surface_model,
     write_surface_model,
 )
+from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
 from limit_surface_ros.nodes.model_host import ModelHost
-from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.kinds.polynomial import Polynomial
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
@@ -56,7 +57,7 @@ def test_what_is_to_be_said_of_a_model_goes_into_the_log_in_plain_words(tmp_path
     write_surface_model(SurfaceModel("cross", Polynomial(cross)), path)
 
     class Parameters:
-        def concern(self, names, prepare):
+        def on_change(self, names, prepare, **_):
             prepare(dict(zip(names, ([str(path)], ""), strict=True)))()
 
     said = []
@@ -158,4 +159,14 @@ def test_models_are_listed_with_what_is_known_of_them(ros, client_node, model_fi
     assert models[0].normal_force == 9.0
     assert math.isnan(models[1].normal_force)
     assert models[1].characteristic_length == 0.3
-    assert "objective: J2" in models[1].fit
+    assert not hasattr(models[1], "fit")
+    described = ros.client(client_node, DescribeModel, "/limit_surface/describe_model")
+    answer = described(DescribeModel.Request(model="four"))
+    assert answer.name == "four"
+    assert "objective: J2" in answer.fit
+    summary = yaml.safe_load(answer.summary)
+    limits = dented.wrench_of_twist(np.eye(3))
+    assert summary["largest_moment"] == pytest.approx(limits[2, 2], rel=1e-5)
+    assert summary["limit_along_x"][1] == pytest.approx(limits[0, 0], rel=1e-5)
+    assert summary["convex"] is False
+    assert described(DescribeModel.Request(model="no")).error_code == ErrorCode.UNKNOWN_MODEL

@@ -13,8 +13,8 @@ pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not b
 from rcl_interfaces.msg import ParameterType
 from rclpy.parameter import Parameter
 
+from limit_surface_ros.nodes.limit_surface_node import SETTINGS, LimitSurfaceNode
 from limit_surface_ros.nodes.model_node import COMMON_SETTINGS
-from limit_surface_ros.nodes.surface_node import SETTINGS, LimitSurfaceNode
 
 TABLE = [*SETTINGS, *COMMON_SETTINGS]
 
@@ -77,7 +77,7 @@ def test_a_defect_that_a_new_value_meets_is_answered_and_the_old_value_stays(nod
             raise OSError("the disk is gone")
         return lambda: None
 
-    node.values.concern(["input_timeout"], broken_for_two)
+    node.values.on_change(["input_timeout"], broken_for_two)
     (result,) = node.set_parameters([Parameter("input_timeout", value=2.0)])
     assert not result.successful
     assert "please report it: OSError: the disk is gone" in result.reason

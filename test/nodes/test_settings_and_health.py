@@ -8,7 +8,7 @@ import math
 import pytest
 
 from limit_surface_ros.errors import RangeError, ShapeError
-from limit_surface_ros.nodes.health import CallbackTimes, Health, InputAge
+from limit_surface_ros.nodes.diagnostics import CallbackTimes, Health, InputAge
 from limit_surface_ros.nodes.settings import Setting
 
 
