@@ -69,9 +69,8 @@ def read_interface(path: Path) -> Interface:
             interface.parts.append([])
         elif code:
             kind, _, name = code.partition(" ")
-            interface.parts[-1].append(
-                (kind, name.strip(), " ".join([*comments, comment]).strip())
-            )
+            meaning = " ".join([*comments, comment]).strip()
+            interface.parts[-1].append((kind, name.strip(), meaning))
             comments.clear()
         elif line.strip():
             comments.append(comment)

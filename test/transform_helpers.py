@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A stand-in for a tf2 buffer, with the methods that the nodes call and the meaning that tf2 gives.
+"""A stand-in for a tf2 buffer: the methods that the nodes call, with the meaning that tf2 gives.
 
-tf2_ros is not on the Python package index. One pair of frames, poses by stamp, linear between them.
+tf2_ros is not on the Python package index. One pair of frames, poses by stamp, linear between.
 """
 
 from __future__ import annotations

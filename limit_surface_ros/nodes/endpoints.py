@@ -3,19 +3,19 @@
 
 A handler is a function or a coroutine. What it raises becomes an error code, a count and a line in
 the log. It may wait (`await Waiting()`) and, if it takes long, let the others have a turn
-(`await endpoints.give_way()`): rclpy's executors resume coroutines of services, `Endpoints` those
-of topics.
+(`await endpoints.give_way()`). `Endpoints` resumes coroutines by itself: of rclpy's executors one
+looks at each of those that wait whenever anything happens, and the other knows none.
 """
 
 from __future__ import annotations
 
 import collections
+import functools
 import inspect
 import time
 import traceback
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -28,7 +28,7 @@ from limit_surface_ros.nodes.diagnostics import Health, InputAge
 from limit_surface_ros.nodes.peers import LostMessages
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterator
+    from collections.abc import Callable, Coroutine, Iterator
 
     from rclpy.node import Node
     from rclpy.publisher import Publisher
@@ -53,7 +53,7 @@ class Waiting:
         """Wait."""
         self.settled = False
         self.refused_by: Exception | None = None
-        # Set by who drives the coroutine, if it is not an executor.
+        # Set by who drives the coroutine.
         self.resume: Callable[[], None] | None = None
 
     def settle(self, refused_by: Exception | None = None) -> None:
@@ -70,13 +70,6 @@ class Waiting:
             yield self
         if self.refused_by is not None:
             raise self.refused_by
-
-
-class _Turn:
-    """Suspends a coroutine once."""
-
-    def __await__(self) -> Iterator[None]:
-        yield
 
 
 class Service(NamedTuple):
@@ -140,7 +133,6 @@ class Endpoints:
         self._node = node
         self._health = health
         self._peers = peers
-        self._group = ReentrantCallbackGroup()
         self._ending = False
         self._waiting: dict[str, collections.deque[Waiting]] = {}
         self.when_ending: list[Callable[[Exception], None]] = []
@@ -151,16 +143,15 @@ class Endpoints:
         """Serve `~/name`."""
         check = answers.FiniteCheck(service.type.Response, service.unbounded)
 
-        async def answer(request: Any, response: Any) -> Any:
-            return await self._answer(service, check, request, response)
+        def refused(error: Exception, sentence: str) -> Any:
+            # Nothing of a half-filled answer may be taken for one.
+            code = answers.error_code(error)
+            return service.type.Response(error_code=code, error_msg=sentence)
 
-        self._node.create_service(
-            service.type,
-            f"~/{service.name}",
-            answer,
-            qos_profile=QoSProfile(depth=WAITING),
-            callback_group=self._group,
-        )
+        def handler(request: Any, response: Any) -> Any:
+            return service.handler(self._node, request, response)
+
+        self._serve(service.type, service.name, handler, refused, check)
 
     def serve_trigger(self, name: str, handler: Callable[[Any, Any], Any], unchanged: str) -> None:
         """Serve `~/name` of type std_srvs/Trigger, whose answers hold no error code.
@@ -171,20 +162,48 @@ class Endpoints:
             unchanged: What is said of the node after a refusal.
         """
 
-        async def answer(request: Trigger.Request, response: Trigger.Response) -> Any:
-            self.under_way += 1
-            try:
-                if self._ending:
-                    raise UnavailableError("the node is ending")
-                await _Timed(handler, (request, response), self._health)
-            except Exception as error:
-                sentence = self.refuse(name, error)
-                response = Trigger.Response(message=f"{sentence}; {unchanged}")
-            self.under_way -= 1
-            self.last_request = time.monotonic()
-            return response
+        def refused(_: Exception, sentence: str) -> Any:
+            return Trigger.Response(message=f"{sentence}; {unchanged}")
 
-        self._node.create_service(Trigger, f"~/{name}", answer, callback_group=self._group)
+        self._serve(Trigger, name, handler, refused, answers.FiniteCheck(Trigger.Response))
+
+    def _serve(
+        self,
+        kind: Any,
+        name: str,
+        handler: Callable[[Any, Any], Any],
+        refused: Callable[[Exception, str], Any],
+        check: answers.FiniteCheck,
+    ) -> None:
+        def answer(call: tuple[Any, Any], header: Any) -> None:
+            response = call[1]
+
+            def ended(error: Exception | None) -> None:
+                if error is None:
+                    try:
+                        check(response)
+                    except LimitSurfaceError as not_finite:
+                        error = not_finite
+                if error is None:
+                    self._health.accepted[name] += 1
+                    answered = response
+                else:
+                    answered = refused(error, self.refuse(name, error))
+                self.under_way -= 1
+                self.last_request = time.monotonic()
+                send(answered, header)
+
+            self.under_way += 1
+            if self._ending:
+                ended(UnavailableError("the node is ending"))
+            else:
+                _Handling(self, handler, call, ended).begin()
+
+        # rclpy calls this with what the callback returns, once it has; the answer is sent later.
+        service = self._node.create_service(
+            kind, f"~/{name}", lambda *call: call, qos_profile=QoSProfile(depth=WAITING)
+        )
+        send, service.send_response = service.send_response, answer
 
     def add_input(
         self,
@@ -260,9 +279,9 @@ class Endpoints:
 
     async def give_way(self) -> None:
         """Let whatever else is due have its turn."""
-        # An executor looks at coroutines again when something happens: make it happen.
-        self._node.executor.create_task(_nothing)
-        await _Turn()
+        turn = Waiting()
+        self._node.executor.create_task(turn.settle)
+        await turn
 
     def end(self) -> None:
         """Refuse what waits and what comes from now on; answers that have begun are finished."""
@@ -286,82 +305,89 @@ class Endpoints:
             logger.error(f"{name}: {lines}", throttle_duration_sec=LOG_PERIOD)
         return sentence
 
-    async def _answer(
-        self, service: Service, check: answers.FiniteCheck, request: Any, response: Any
-    ) -> Any:
-        self.under_way += 1
-        try:
-            if self._ending:
-                raise UnavailableError("the node is ending")
-            await _Timed(service.handler, (self._node, request, response), self._health)
-            check(response)
-            self._health.accepted[service.name] += 1
-        except Exception as error:
-            # Nothing of a half-filled answer may be taken for one.
-            response = service.type.Response(
-                error_code=answers.error_code(error), error_msg=self.refuse(service.name, error)
-            )
-        self.under_way -= 1
-        self.last_request = time.monotonic()
-        return response
-
     def _take(self, name: str, handler: Callable[[Any], Any], message: Any) -> None:
-        self._step(name, _Timed(handler, (message,), self._health).__await__())
+        queue = self._waiting[name]
 
-    def _step(self, name: str, handling: Generator[Any, None, Any]) -> None:
-        """Run the handling of a message to its end, or to where it waits."""
-        try:
-            waiting = handling.send(None)
-        except StopIteration:
+        def ended(error: Exception | None) -> None:
+            if error is not None:
+                self.refuse(name, error)
+                return
             self._health.accepted[name] += 1
             if name in self._health.inputs:
                 self._health.inputs[name].last = self._node.get_clock().now().nanoseconds
-        except Exception as error:
-            self.refuse(name, error)
-        else:
-            queue = self._waiting[name]
-            queue.append(waiting)
 
-            def resume() -> None:
-                queue.remove(waiting)
-                self._step(name, handling)
+        _Handling(self, handler, (message,), ended, queue).begin()
+        if len(queue) > MOST_WAITING:
+            queue[0].settle(
+                UnavailableError(f"more than {MOST_WAITING} messages wait for transforms")
+            )
 
-            waiting.resume = resume
-            if len(queue) > MOST_WAITING:
-                queue[0].settle(
-                    UnavailableError(f"more than {MOST_WAITING} messages wait for transforms")
-                )
+    def count_time(self, seconds: float) -> None:
+        """Count a stretch of time [s] in which nobody else had a turn."""
+        self._health.times.add(seconds)
 
 
-class _Timed:
-    """Runs a handler and counts the time of each stretch in which nobody else had a turn."""
+class _Handling:
+    """One request or message on its way through a handler.
+
+    Args:
+        endpoints: Whose it is.
+        handler: Function or coroutine function.
+        arguments: What it is called with.
+        ended: Called at the end, with an error or None.
+        queue: Where those that wait are kept, the oldest first.
+    """
 
     def __init__(
-        self, handler: Callable[..., Any], arguments: tuple[Any, ...], health: Health
+        self,
+        endpoints: Endpoints,
+        handler: Callable[..., Any],
+        arguments: tuple[Any, ...],
+        ended: Callable[[Exception | None], None],
+        queue: collections.deque[Waiting] | None = None,
     ) -> None:
+        self._endpoints = endpoints
         self._handler = handler
         self._arguments = arguments
-        self._health = health
+        self._ended = ended
+        self._queue = queue
+        self._running: Coroutine[Any, Any, None] | None = None
 
-    def __await__(self) -> Generator[Any, None, Any]:
-        times = self._health.times
+    def begin(self) -> None:
+        """Call the handler."""
         start = time.perf_counter()
+        error = None
         try:
-            running = self._handler(*self._arguments)
-            if not inspect.iscoroutine(running):
-                return running
-            while True:
-                try:
-                    waiting = running.send(None)
-                except StopIteration as ended:
-                    return ended.value
-                times.add(time.perf_counter() - start)
-                yield waiting
-                times = self._health.times
-                start = time.perf_counter()
-        finally:
-            times.add(time.perf_counter() - start)
+            self._running = self._handler(*self._arguments)
+        except Exception as raised:
+            error = raised
+        if error is not None or not inspect.iscoroutine(self._running):
+            self._end(start, error)
+        else:
+            self._step(start)
 
+    def _step(self, start: float) -> None:
+        """Run the coroutine to its end, or to where it waits."""
+        error = None
+        try:
+            waiting: Waiting = self._running.send(None)
+        except StopIteration:
+            pass
+        except Exception as raised:
+            error = raised
+        else:
+            self._endpoints.count_time(time.perf_counter() - start)
+            waiting.resume = functools.partial(self._resume, waiting)
+            if self._queue is not None:
+                self._queue.append(waiting)
+            return
+        self._end(start, error)
 
-def _nothing() -> None:
-    """Do nothing, as a task that wakes an executor."""
+    def _resume(self, waiting: Waiting) -> None:
+        if self._queue is not None:
+            self._queue.remove(waiting)
+        self._step(time.perf_counter())
+
+    def _end(self, start: float, error: Exception | None) -> None:
+        self._endpoints.count_time(time.perf_counter() - start)
+        self._ended(error)

@@ -129,7 +129,3 @@ def provenance(model: SurfaceModel | DecayModel) -> str:
     if not model.fit:
         return ""
     return str(yaml.safe_dump(plain(dict(model.fit)), sort_keys=False))
-
-
-def _terms(surface: Any) -> int:
-    return next(len(getattr(surface, key)) for key in _TERMS if hasattr(surface, key))

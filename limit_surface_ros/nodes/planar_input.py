@@ -322,9 +322,7 @@ class PlanarInput:
 
 def prepare_surface(model: SurfaceModel) -> None:
     """Do ahead what the first requests would have to wait for."""
-    prepare = getattr(model.surface, "prepare", None)
-    if prepare is not None:
-        prepare()
+    model.surface.prepare()
 
 
 def wrench_at_origin(model: SurfaceModel, wrench: Sequence[float]) -> tuple[float, ...]:

@@ -10,11 +10,16 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
 
+from limit_surface_interfaces.msg import ErrorCode
+from limit_surface_interfaces.srv import WrenchToTwist
 from rcl_interfaces.msg import ParameterType
+from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
 
 from limit_surface_ros.nodes.limit_surface_node import SETTINGS, LimitSurfaceNode
 from limit_surface_ros.nodes.model_node import COMMON_SETTINGS
+from node_helpers import wrench_message
 
 TABLE = [*SETTINGS, *COMMON_SETTINGS]
 
@@ -60,6 +65,7 @@ def test_every_parameter_starts_at_its_default(node, setting):
         ("model_files", ["package://nowhere/models"], "nowhere"),
         ("default_model", "sofa", "sofa"),
         ("executor", "events", "read-only"),
+        ("model_files", "/nowhere.yaml", "write ['/nowhere.yaml']"),
     ],
 )
 def test_a_bad_value_is_refused_and_the_old_one_stays(node, name, value, told):
@@ -82,6 +88,61 @@ def test_a_defect_that_a_new_value_meets_is_answered_and_the_old_value_stays(nod
     assert not result.successful
     assert "please report it: OSError: the disk is gone" in result.reason
     assert node.values["input_timeout"] == node.get_parameter("input_timeout").value == 0.5
+
+
+def test_a_whole_number_does_for_one_with_a_point(node):
+    (result,) = node.set_parameters([Parameter("normal_force", value=5)])
+    assert result.successful, result.reason
+    assert node.values["normal_force"] == node.get_parameter("normal_force").value == 5.0
+    assert isinstance(node.get_parameter("normal_force").value, float)
+    (result,) = node.set_parameters([Parameter("normal_force", value=0)])
+    assert not result.successful
+
+
+@pytest.mark.parametrize(
+    "names", [("model_files", "default_model"), ("default_model", "model_files")]
+)
+def test_files_and_default_change_together_in_any_order_of_one_request(
+    ros, client_node, node, model_file, names
+):
+    _, path = model_file("crate", seed=1)
+    node.set_parameters([Parameter("default_model", value="box")])
+    values = {"model_files": [str(path)], "default_model": "crate"}
+    # As `ros2 param load` asks.
+    load = ros.client(client_node, SetParameters, "/limit_surface/set_parameters")
+    given = [Parameter(name, value=values[name]).to_parameter_msg() for name in names]
+    answer = load(SetParameters.Request(parameters=given))
+    assert [result.successful for result in answer.results] == [True, True], answer.results
+    assert node.models.models.default == "crate"
+    others = [Parameter("input_timeout", value=-1.0), Parameter("normal_force", value=2.0)]
+    given = [parameter.to_parameter_msg() for parameter in others]
+    answer = load(SetParameters.Request(parameters=given))
+    assert [result.successful for result in answer.results] == [False, True]
+
+
+def test_a_default_that_other_files_do_not_hold_is_refused_with_the_way_to_change_both(
+    node, model_file
+):
+    _, path = model_file("crate", seed=1)
+    node.set_parameters([Parameter("default_model", value="box")])
+    (result,) = node.set_parameters([Parameter("model_files", value=[str(path)])])
+    assert not result.successful
+    assert "in one request, as `ros2 param load` does" in result.reason
+
+
+def test_a_locked_node_takes_no_changes_and_no_reload(ros, client_node, model_file):
+    node = ros.add(LimitSurfaceNode, files=[model_file()[1]], parameters={"locked": True})
+    for name, value in (("normal_force", 2.0), ("use_sim_time", True), ("locked", False)):
+        (result,) = node.set_parameters([Parameter(name, value=value)])
+        assert not result.successful
+    assert node.values["normal_force"] == 1.0
+    reload = ros.client(client_node, Trigger, "/limit_surface/reload")
+    answer = reload(Trigger.Request())
+    assert not answer.success
+    assert "locked" in answer.message
+    ask = ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
+    asked = WrenchToTwist.Request(wrench=wrench_message([3.0, 1.0, 0.1]))
+    assert ask(asked).error_code == ErrorCode.NONE
 
 
 def test_an_empty_list_of_models_is_refused(node):

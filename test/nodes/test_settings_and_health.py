@@ -65,8 +65,9 @@ def test_refusals_are_counted_by_place_and_code():
     health = Health()
     health.refuse("wrench", "NOT_FINITE", "force.x is NaN")
     health.refuse("wrench", "NOT_FINITE", "force.y is NaN")
-    assert health.refused["wrench", "NOT_FINITE"] == health.news == 2
+    assert health.refused["wrench", "NOT_FINITE"] == health.news["wrench", "NOT_FINITE"] == 2
+    assert health.news_in_words().startswith("2 inputs refused (2 on wrench: NOT_FINITE)")
     assert health.last_error == "wrench: force.y is NaN"
     health.restart_window()
-    assert health.news == 0
+    assert not health.news
     assert health.refused["wrench", "NOT_FINITE"] == 2
