@@ -14,7 +14,7 @@ pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not b
 
 from limit_surface_ros.nodes.ask import main
 from limit_surface_ros.nodes.decay_node import DecayNode
-from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
+from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
 from process_helpers import WAIT
 
 
