@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from limit_surface_ros.nodes.endpoints import Endpoints
-    from limit_surface_ros.nodes.model_node import ModelNode
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # What a user gets wrong at start is told in one line, without a traceback. rcl's errors, unknown
@@ -71,7 +70,7 @@ EXECUTOR = Setting(
 
 
 def run(
-    make_nodes: Callable[[], Sequence[ModelNode[Any]]],
+    make_nodes: Callable[[], Sequence[Any]],
     tables: Mapping[str, Iterable[Setting]],
     description: str,
     argv: Sequence[str],
@@ -136,7 +135,7 @@ def run(
     return 0
 
 
-def _executor(nodes: Sequence[ModelNode[Any]]) -> Executor:
+def _executor(nodes: Sequence[Any]) -> Executor:
     """Make the executor that the nodes ask for.
 
     Raises:
