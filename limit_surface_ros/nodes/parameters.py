@@ -76,6 +76,7 @@ class Parameters:
 
     def __init__(self, node: Node, table: Iterable[Setting]) -> None:
         """Declare the table."""
+        self._node = node
         self._logger = node.get_logger()
         self._settings = {setting.name: setting for setting in table}
         self._dependents: list[tuple[frozenset[str], Prepare]] = []
@@ -93,7 +94,6 @@ class Parameters:
         node.add_pre_set_parameters_callback(self._fit_types)
         node.add_on_set_parameters_callback(self._prepare)
         node.add_post_set_parameters_callback(self._apply)
-        self._node = node
         for service in node.services:
             if service.service_name.endswith("/set_parameters"):
                 service.callback = self._set
@@ -193,7 +193,8 @@ class Parameters:
         changed = {p.name: _plain(p.value) for p in parameters if p.name in self._settings}
         proposed = {**self._values, **changed}
         try:
-            if self._locked:
+            # What is declared later, such as the QoS of a topic, is no change.
+            if self._locked and any(self._node.has_parameter(p.name) for p in parameters):
                 raise UnavailableError(_LOCKED_MESSAGE)
             for name, value in changed.items():
                 if name in self._mistyped:
