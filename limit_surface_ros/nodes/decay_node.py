@@ -24,6 +24,7 @@ from limit_surface_ros.files.decay_file import DecayModel, read_decay_model
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.motion.holding import holds_from
 from limit_surface_ros.nodes import convert, frames, model_info, planar_input, spin
+from limit_surface_ros.nodes.batches import Batches, empty_rows
 from limit_surface_ros.nodes.convert import SECOND, nanoseconds
 from limit_surface_ros.nodes.endpoints import Service
 from limit_surface_ros.nodes.model_host import model_settings
@@ -93,8 +94,8 @@ SETTINGS = (
     ),
     Setting(
         "max_times",
-        100_000,
-        "Times that ~/evaluate answers at once",
+        1_000_000,
+        "Times that ~/evaluate answers; others are served between its slices",
         minimum=1,
         maximum=10_000_000,
     ),
@@ -109,6 +110,7 @@ class DecayNode(ModelNode[DecayModel]):
     Attributes:
         surfaces: Limit surfaces of the bodies whose stop is predicted.
         input: Messages as these surfaces take them.
+        batches: Runs what takes long.
 
     Args:
         buffer: What transforms are looked up in, in place of a tf2 buffer of the node's own.
@@ -127,6 +129,7 @@ class DecayNode(ModelNode[DecayModel]):
             read_surface_model, "surface_files", "default_surface", "surface", prepare_surface
         )
         self._frames = frames.Frames(self, self.values, buffer)
+        self.batches = Batches(self.endpoints)
         self.input = PlanarInput(self.values, self._frames, self.report)
         self._onset: Onset | None = None
         self._forecast_time = 0
@@ -288,7 +291,7 @@ def describe_model(
     response.fit = model_info.provenance(model)
 
 
-def evaluate(
+async def evaluate(
     node: DecayNode, request: EvaluateDecay.Request, response: EvaluateDecay.Response
 ) -> None:
     """Answer `~/evaluate`."""
@@ -297,7 +300,13 @@ def evaluate(
         raise RangeError(
             f"times holds {len(request.times)} times; at most {most} are accepted, see max_times"
         )
-    response.values = convert.flat_of(model.sum(np.asarray(request.times)))
+    flat, values = empty_rows(len(request.times), 1)
+
+    def work(part: slice) -> None:
+        values[part] = model.sum(np.asarray(request.times[part]))
+
+    await node.batches.run(len(request.times), work)
+    response.values = flat
     response.bound = model.max_error
     response.bound_from, response.bound_until = model.time_span
 
