@@ -74,6 +74,12 @@ class GeometryError(LimitSurfaceError, ValueError):
     code = "BAD_MODEL"
 
 
+class OutlineError(GeometryError):
+    """The outline of a body crosses itself or encloses nothing, or a tip begins deep within it."""
+
+    code = "BAD_DATA"
+
+
 class DataError(LimitSurfaceError, ValueError):
     """Recorded or simulated data cannot support what is asked of them."""
 

@@ -7,9 +7,13 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from limit_surface_ros.checks import as_floats
+from limit_surface_ros.errors import ShapeError
+
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from limit_surface_ros.checks import Floats
 
@@ -85,3 +89,87 @@ class MotionCone:
     wrenches: Floats
     twists: Floats
     velocities: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class PushRuns:
+    """Where n pushes end.
+
+    Attributes:
+        end_poses: Of the bodies, x, y [m] and angle [rad], shape (n, 3).
+        touched_at: Lengths along the paths at which the tips first touch [m]; NaN if never.
+        left_at: The same where they leave for good; NaN if they touch to the end, or never.
+        errors: Sums of the estimated errors of the steps [m], of position or of the turn times
+            the outline's mean radius; an estimate of the end pose's error, and no bound.
+        evaluations: How many single pushes were solved for each.
+    """
+
+    end_poses: Floats
+    touched_at: Floats
+    left_at: Floats
+    errors: Floats
+    evaluations: NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class PushRun:
+    """How one push goes on, at k places along its path.
+
+    Attributes:
+        end_pose: Of the body, x, y [m] and angle [rad], shape (3,).
+        poses: On the way, shape (k, 3).
+        path_lengths: Of the tip's path up to there [m], never falling, shape (k,).
+        tips: Centres of the tip, shape (k, 2) [m].
+        contacts: Points of the outline next to the tip, in the frame of the path, (k, 2) [m].
+        modes: What the pusher does from there on, k members.
+        twists: Of the body in its own frame about the surface's reference point, for a tip of
+            1 m/s, (vx, vy, omega_z) in [m/s, m/s, rad/s], shape (k, 3).
+        wrenches: Of the tip on the body, in its frame about that point, (fx, fy, tau_z) in
+            [N, N, N m]; zero where it does not push, shape (k, 3).
+        touched_at: Length along the path at which the tip first touches [m]; None if never.
+        left_at: The same where it leaves for good; None if it touches to the end, or never.
+        error: Sum of the estimated errors of the steps [m]; see `PushRuns`.
+        evaluations: How many single pushes were solved.
+    """
+
+    end_pose: Floats
+    poses: Floats
+    path_lengths: Floats
+    tips: Floats
+    contacts: Floats
+    modes: tuple[ContactMode, ...]
+    twists: Floats
+    wrenches: Floats
+    touched_at: float | None
+    left_at: float | None
+    error: float
+    evaluations: int
+    _rates: Floats
+
+    def poses_at(self, lengths: ArrayLike) -> Floats:
+        """Return poses at lengths along the tip's path, by cubics between the steps.
+
+        Args:
+            lengths: [m], those beyond the path's ends are taken as the ends; shape (m,).
+
+        Returns:
+            x, y [m] and angle [rad], shape (m, 3).
+        """
+        asked = np.clip(as_floats("lengths", lengths), 0.0, self.path_lengths[-1])
+        if asked.ndim != 1:
+            raise ShapeError(f"lengths must have shape (m,), got {asked.shape}")
+        s = self.path_lengths
+        after = np.clip(np.searchsorted(s, asked, side="right"), 1, len(s) - 1)
+        before = after - 1
+        width = s[after] - s[before]
+        t = ((asked - s[before]) / np.where(width > 0.0, width, 1.0))[:, np.newaxis]
+        h = width[:, np.newaxis]
+        a, b = self.poses[before], self.poses[after]
+        ka, kb = self._rates[before], self._rates[after]
+        cubic = (
+            (1 + 2 * t) * (1 - t) ** 2 * a
+            + t * (1 - t) ** 2 * h * ka
+            + t * t * (3 - 2 * t) * b
+            - t * t * (1 - t) * h * kb
+        )
+        return np.asarray(cubic)

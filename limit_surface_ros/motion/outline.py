@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from limit_surface_ros.checks import as_floats
-from limit_surface_ros.errors import GeometryError, RangeError, ShapeError
+from limit_surface_ros.errors import OutlineError, RangeError, ShapeError
 from limit_surface_ros.motion.push_checks import as_complex, as_vectors_of
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ class Polygon(Outline):
     Raises:
         ShapeError: The vertices are no list of pairs of numbers.
         NotFiniteError: A coordinate is NaN or infinite.
-        GeometryError: There are fewer than three vertices, they enclose no area, or edges cross.
+        OutlineError: There are fewer than three vertices, they enclose no area, or edges cross.
         RangeError: There are more than 2000 vertices, or lengths that no body has.
 
     Example:
@@ -106,11 +106,11 @@ class Polygon(Outline):
         area = 0.5 * float((cross(points, following)).sum())
         size = float(np.ptp(points, axis=0).max())
         if not abs(area) > _SAME * size * size:
-            raise GeometryError("the vertices of an outline enclose no area")
+            raise OutlineError("the vertices of an outline enclose no area")
         if area < 0.0:
             points = points[::-1]
         if _crosses_itself(points):
-            raise GeometryError("the edges of an outline must not cross or touch each other")
+            raise OutlineError("the edges of an outline must not cross or touch each other")
         points.setflags(write=False)
         self.vertices = points
         edges = np.roll(points, -1, axis=0) - points
@@ -236,7 +236,7 @@ def _vertices(values: ArrayLike) -> Floats:
         apart = np.hypot(*(points - np.roll(points, 1, axis=0)).T)
         points = points[apart > _SAME * np.ptp(points, axis=0).max()]
     if len(points) < 3:
-        raise GeometryError(f"an outline needs at least three vertices, got {len(points)}")
+        raise OutlineError(f"an outline needs at least three vertices, got {len(points)}")
     return np.array(points)
 
 

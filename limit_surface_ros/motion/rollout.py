@@ -3,26 +3,35 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from limit_surface_ros.checks import as_floats, as_positive
-from limit_surface_ros.errors import GeometryError, RangeError, ShapeError
+from limit_surface_ros.errors import OutlineError, RangeError, ShapeError
 from limit_surface_ros.motion.inward_corner import Scene
-from limit_surface_ros.motion.outcomes import MODES, ContactMode
+from limit_surface_ros.motion.outcomes import MODES, PushRun, PushRuns
 from limit_surface_ros.motion.push_checks import as_vectors_of, friction_edges
 from limit_surface_ros.motion.rollout_steps import Rollout
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Generator, Iterator
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.motion.outline import Outline
     from limit_surface_ros.surface.base import LimitSurface
+
+__all__ = [
+    "DEFAULT_ACCURACY",
+    "OVERLAPS",
+    "PushRun",
+    "PushRuns",
+    "push_steps",
+    "simulate_push",
+    "simulate_pushes",
+]
 
 DEFAULT_ACCURACY = 1e-5
 # Accuracy that double precision still gives [m], and the coarsest that makes sense.
@@ -31,97 +40,13 @@ _FINEST, _COARSEST = 1e-12, 1.0
 # the worst of a hundred pushes.
 _STEPS_PER_ACCURACY = 20.0
 # Pushes moved together: few enough for arrays of them to stay in the processor's cache.
-_BLOCK = 2048
+_BLOCK = 1024
 OVERLAPS = ("keep", "push_out")
 # Depth of a tip's centre within an outline, in mean radii, that no error of a pose explains.
 _DEEPEST = 0.25
 _PARTINGS = 30
 # Motions that are searched for in a push, at least.
 _SEARCHES = 10
-
-
-@dataclass(frozen=True, eq=False)
-class PushRuns:
-    """Where n pushes end.
-
-    Attributes:
-        end_poses: Of the bodies, x, y [m] and angle [rad], shape (n, 3).
-        touched_at: Lengths along the paths at which the tips first touch [m]; NaN if never.
-        left_at: The same where they leave for good; NaN if they touch to the end, or never.
-        errors: Sums of the estimated errors of the steps [m], of position or of the turn times
-            the outline's mean radius; an estimate of the end pose's error, and no bound.
-        evaluations: How many single pushes were solved for each.
-    """
-
-    end_poses: Floats
-    touched_at: Floats
-    left_at: Floats
-    errors: Floats
-    evaluations: NDArray[np.intp]
-
-
-@dataclass(frozen=True, eq=False)
-class PushRun:
-    """How one push goes on, at k places along its path.
-
-    Attributes:
-        end_pose: Of the body, x, y [m] and angle [rad], shape (3,).
-        poses: On the way, shape (k, 3).
-        path_lengths: Of the tip's path up to there [m], never falling, shape (k,).
-        tips: Centres of the tip, shape (k, 2) [m].
-        contacts: Points of the outline next to the tip, in the frame of the path, (k, 2) [m].
-        modes: What the pusher does from there on, k members.
-        twists: Of the body in its own frame about the surface's reference point, for a tip of
-            1 m/s, (vx, vy, omega_z) in [m/s, m/s, rad/s], shape (k, 3).
-        wrenches: Of the tip on the body, in its frame about that point, (fx, fy, tau_z) in
-            [N, N, N m]; zero where it does not push, shape (k, 3).
-        touched_at: Length along the path at which the tip first touches [m]; None if never.
-        left_at: The same where it leaves for good; None if it touches to the end, or never.
-        error: Sum of the estimated errors of the steps [m]; see `PushRuns`.
-        evaluations: How many single pushes were solved.
-    """
-
-    end_pose: Floats
-    poses: Floats
-    path_lengths: Floats
-    tips: Floats
-    contacts: Floats
-    modes: tuple[ContactMode, ...]
-    twists: Floats
-    wrenches: Floats
-    touched_at: float | None
-    left_at: float | None
-    error: float
-    evaluations: int
-    _rates: Floats
-
-    def poses_at(self, lengths: ArrayLike) -> Floats:
-        """Return poses at lengths along the tip's path, by cubics between the steps.
-
-        Args:
-            lengths: [m], those beyond the path's ends are taken as the ends; shape (m,).
-
-        Returns:
-            x, y [m] and angle [rad], shape (m, 3).
-        """
-        asked = np.clip(as_floats("lengths", lengths), 0.0, self.path_lengths[-1])
-        if asked.ndim != 1:
-            raise ShapeError(f"lengths must have shape (m,), got {asked.shape}")
-        s = self.path_lengths
-        after = np.clip(np.searchsorted(s, asked, side="right"), 1, len(s) - 1)
-        before = after - 1
-        width = s[after] - s[before]
-        t = ((asked - s[before]) / np.where(width > 0.0, width, 1.0))[:, np.newaxis]
-        h = width[:, np.newaxis]
-        a, b = self.poses[before], self.poses[after]
-        ka, kb = self._rates[before], self._rates[after]
-        cubic = (
-            (1 + 2 * t) * (1 - t) ** 2 * a
-            + t * (1 - t) ** 2 * h * ka
-            + t * t * (3 - 2 * t) * b
-            - t * t * (1 - t) * h * kb
-        )
-        return np.asarray(cubic)
 
 
 def simulate_push(
@@ -155,7 +80,7 @@ def simulate_push(
         ShapeError: An array has another shape, or `overlap` is none of the two words.
         NotFiniteError: A number is NaN or infinite.
         RangeError: The radius or the coefficient is below 0, or the accuracy out of range.
-        GeometryError: Tip and body cannot be parted.
+        OutlineError: Tip and body cannot be parted.
         SolverError: The path needs too many steps.
 
     Example:
@@ -174,7 +99,9 @@ def simulate_push(
     if way.ndim != 2:
         raise ShapeError(f"path must have shape (m, 2), got {way.shape}")
     batch = _Batch(surface, outline, tip_radius, friction, accuracy, overlap, reference_point)
-    (rollout,) = batch.run(given[np.newaxis], way[np.newaxis], record=True)
+    (rollout,) = batch.blocks(given[np.newaxis], way[np.newaxis], record=True)
+    for _ in rollout.rounds():
+        pass
     steps = rollout.recorded
     twists, modes, wrenches, contacts = rollout.outcomes(steps)
     touched, left = float(rollout.touched_at[0]), float(rollout.left_at[0])
@@ -221,7 +148,43 @@ def simulate_pushes(
         reference_point: Of the surface in the body's frame [m], shape (2,).
 
     Raises:
-        ShapeError, NotFiniteError, RangeError, GeometryError, SolverError: As `simulate_push`.
+        ShapeError, NotFiniteError, RangeError, OutlineError, SolverError: As `simulate_push`.
+    """
+    steps = push_steps(
+        surface,
+        outline,
+        tip_radius,
+        friction,
+        poses,
+        paths,
+        accuracy=accuracy,
+        overlap=overlap,
+        reference_point=reference_point,
+    )
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            found: PushRuns = end.value
+            return found
+
+
+def push_steps(
+    surface: LimitSurface,
+    outline: Outline,
+    tip_radius: float,
+    friction: float,
+    poses: ArrayLike,
+    paths: ArrayLike,
+    *,
+    accuracy: float = DEFAULT_ACCURACY,
+    overlap: str = "keep",
+    reference_point: ArrayLike = (0.0, 0.0),
+) -> Generator[None, None, PushRuns]:
+    """Do as `simulate_pushes`, but in steps of a few milliseconds, for who has more to do.
+
+    Yields after each step, and returns what `simulate_pushes` does. What is wrong with the
+    arguments is told by the first step.
     """
     given, ways = as_floats("poses", poses), as_floats("paths", paths)
     if given.ndim != 2 or given.shape[1] != 3:
@@ -229,7 +192,10 @@ def simulate_pushes(
     if ways.ndim != 3 or len(ways) != len(given):
         raise ShapeError(f"paths must have shape ({len(given)}, m, 2), got {ways.shape}")
     batch = _Batch(surface, outline, tip_radius, friction, accuracy, overlap, reference_point)
-    runs = list(batch.run(given, ways, record=False))
+    runs = []
+    for rollout in batch.blocks(given, ways, record=False):
+        yield from rollout.rounds()
+        runs.append(rollout)
     return PushRuns(
         *(
             np.concatenate([getattr(run, name) for run in runs])
@@ -270,8 +236,8 @@ class _Batch:
         )
         self._radius, self._overlap = radius, overlap
 
-    def run(self, poses: Floats, paths: Floats, *, record: bool) -> Iterator[Rollout]:
-        """Yield blocks of pushes that have reached their ends, at least one."""
+    def blocks(self, poses: Floats, paths: Floats, *, record: bool) -> Iterator[Rollout]:
+        """Yield blocks of pushes that have not begun, at least one."""
         if paths.shape[2:] != (2,) or paths.shape[1] < 2:
             raise ShapeError(f"a path has shape (m, 2) with m at least 2, got {paths.shape[1:]}")
         if self._scene.surface.wrench_is_closed:
@@ -280,9 +246,7 @@ class _Batch:
         for start in range(0, max(len(poses), 1), _BLOCK):
             block = slice(start, start + _BLOCK)
             begun, radii = self._parted(poses[block], paths[block, 0])
-            rollout = Rollout(self._scene, begun, paths[block], radii, record=record)
-            rollout.run()
-            yield rollout
+            yield Rollout(self._scene, begun, paths[block], radii, record=record)
 
     def _parted(self, poses: Floats, tips: Floats) -> tuple[Floats, Floats]:
         """Return poses from which to begin, and distances at which the tips touch."""
@@ -292,7 +256,7 @@ class _Batch:
         deepest = -_DEEPEST * outline.mean_radius
         deep = np.flatnonzero(near.distances < deepest)
         if len(deep):
-            raise GeometryError(
+            raise OutlineError(
                 f"the tip of push {deep[0]} begins {-near.distances[deep[0]]:.6g} m within the "
                 f"outline: its centre may be at most {-deepest:.6g} m within"
             )

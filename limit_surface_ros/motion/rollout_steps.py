@@ -24,6 +24,8 @@ from limit_surface_ros.motion.push_checks import as_complex, as_vectors_of
 from limit_surface_ros.motion.push_roots import SEPARATE
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from limit_surface_ros.checks import Bools, Complexes, Floats, Places
     from limit_surface_ros.motion.outline import Nearest
 
@@ -91,8 +93,8 @@ class Rollout:
         self.evaluations, self.errors = np.zeros(count, dtype=np.intp), np.zeros(count)
         self._record: list[Steps] | None = [] if record else None
 
-    def run(self) -> None:
-        """Move all pushes to the ends of their paths.
+    def rounds(self) -> Iterator[None]:
+        """Move all pushes to the ends of their paths, and yield after each round of steps.
 
         Raises:
             SolverError: Steps became so short that a path does not end.
@@ -111,6 +113,7 @@ class Rollout:
             for rows, corner in ((touching, False), (cornered, True)):
                 if len(rows):
                     self._take_steps(rows, corner)
+            yield
         raise SolverError(
             "the path of a push needs more than 100000 steps: ask for less accuracy, or take a "
             "tip of a larger radius"

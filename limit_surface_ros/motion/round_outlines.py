@@ -109,7 +109,7 @@ class SmoothCurve(Outline):
         points: In order, either way round, the first not repeated, shape (n, 2) [m].
 
     Raises:
-        ShapeError, NotFiniteError, GeometryError, RangeError: As `Polygon`.
+        ShapeError, NotFiniteError, OutlineError, RangeError: As `Polygon`.
     """
 
     def __init__(self, points: ArrayLike) -> None:
