@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Services of the `limit_surface` node that push bodies along paths."""
+
+from __future__ import annotations
+
+import time
+from array import array
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from geometry_msgs.msg import PoseStamped
+from limit_surface_interfaces.srv import SimulatePush, SimulatePushes
+
+from limit_surface_ros.checks import as_floats
+from limit_surface_ros.errors import DataError, FrameError, RangeError, ShapeError
+from limit_surface_ros.motion.outcomes import MODES
+from limit_surface_ros.motion.outline import Polygon
+from limit_surface_ros.motion.rollout import (
+    DEFAULT_ACCURACY,
+    OVERLAPS,
+    push_steps,
+    simulate_push,
+)
+from limit_surface_ros.nodes import convert
+from limit_surface_ros.nodes.endpoints import Service
+from limit_surface_ros.nodes.planar_input import wrench_at_origin
+from limit_surface_ros.surface.frames import RigidTransform
+
+if TYPE_CHECKING:
+    from geometry_msgs.msg import Pose
+    from nav_msgs.msg import Path
+
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.files.surface_file import SurfaceModel
+    from limit_surface_ros.motion.outline import Outline
+    from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
+
+# Poses of a path that are accepted: each starts a step anew.
+MOST_POSES = 1000
+# Pushes of a batch that are accepted.
+MOST_PUSHES = 100_000
+# Time between turns of others [s].
+TURN = 0.003
+# How far the z axis of a pose may lean, as a cosine.
+UPRIGHT = 0.999
+# What `Push`, `SimulatePush` and the core call the modes.
+_NUMBERS = {mode: getattr(SimulatePush.Response, mode.name) for mode in MODES}
+
+
+async def simulate_one(
+    node: LimitSurfaceNode, request: SimulatePush.Request, response: SimulatePush.Response
+) -> None:
+    """Answer `~/simulate_push`."""
+    model = node.models[request.model]
+    tips, stamps = _tips(request)
+    run = simulate_push(
+        node.input.policy.surface_of(model),
+        outline_of(model, request),
+        request.tip_radius,
+        request.friction,
+        _planar_pose(request.start),
+        tips,
+        accuracy=request.accuracy or DEFAULT_ACCURACY,
+        overlap=_overlap(request.overlap),
+        reference_point=model.reference_point,
+    )
+    first = convert.nanoseconds(request.header.stamp)
+    if stamps is None:
+        times = np.zeros(len(run.path_lengths))
+    else:
+        first = int(stamps[0])
+        lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(tips, axis=0).T))])
+        times = np.interp(run.path_lengths, lengths, (stamps - stamps[0]).astype(np.float64))
+    response.body_path.header = request.header
+    for pose, later in zip(run.poses.tolist(), times.tolist(), strict=True):
+        stamped = PoseStamped()
+        stamped.header.frame_id = request.header.frame_id
+        convert.fill_stamp(stamped.header.stamp, first + round(later))
+        _fill_pose(stamped.pose, pose)
+        response.body_path.poses.append(stamped)
+    response.end = response.body_path.poses[-1]
+    response.path_lengths = convert.flat_of(run.path_lengths)
+    response.modes = array("B", [_NUMBERS[mode] for mode in run.modes])
+    response.wrenches = convert.flat_of(
+        np.array([wrench_at_origin(model, wrench) for wrench in run.wrenches])
+    )
+    response.touched = run.touched_at is not None
+    response.touched_at = run.touched_at or 0.0
+    response.left = run.left_at is not None
+    response.left_at = run.left_at or 0.0
+    response.estimated_error = run.error
+
+
+async def simulate_many(
+    node: LimitSurfaceNode, request: SimulatePushes.Request, response: SimulatePushes.Response
+) -> None:
+    """Answer `~/simulate_pushes`, in steps between which others have their turns."""
+    model = node.models[request.model]
+    poses = _rows("poses", request.poses, 3)
+    starts, ends = (_rows(name, getattr(request, name), 2) for name in ("tip_starts", "tip_ends"))
+    if not len(poses) == len(starts) == len(ends):
+        raise ShapeError(
+            "poses, tip_starts and tip_ends must be as many, "
+            f"got {len(poses)}, {len(starts)} and {len(ends)}"
+        )
+    steps = push_steps(
+        node.input.policy.surface_of(model),
+        outline_of(model, request),
+        request.tip_radius,
+        request.friction,
+        poses,
+        np.stack([starts, ends], axis=1),
+        accuracy=request.accuracy or DEFAULT_ACCURACY,
+        overlap=_overlap(request.overlap),
+        reference_point=model.reference_point,
+    )
+    begin = time.perf_counter()
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            runs = end.value
+            break
+        if time.perf_counter() - begin > TURN:
+            await node.endpoints.give_way()
+            begin = time.perf_counter()
+    answer = SimulatePushes.Response
+    outcomes = np.where(np.isnan(runs.left_at), answer.TOUCHES, answer.LEAVES)
+    outcomes = np.where(np.isnan(runs.touched_at), answer.MISSES, outcomes)
+    response.header = request.header
+    response.end_poses = convert.flat_of(runs.end_poses)
+    response.outcomes = array("B", outcomes.astype(np.uint8).tobytes())
+    response.estimated_errors = convert.flat_of(runs.errors)
+
+
+def outline_of(model: SurfaceModel, request: Any) -> Outline:
+    """Return the outline that a request gives, or that of its model.
+
+    Raises:
+        OutlineError: The request's crosses itself or encloses nothing.
+        NotFiniteError: A coordinate is NaN or infinite.
+        RangeError: There are too many vertices.
+        DataError: Neither gives one.
+    """
+    points = request.outline.points
+    if points:
+        return Polygon([(point.x, point.y) for point in points])
+    if model.outline is None:
+        raise DataError(
+            f"model {model.name!r} has no outline: give one with the request, or in its file"
+        )
+    return model.outline
+
+
+def _overlap(number: int) -> str:
+    if not 0 <= number < len(OVERLAPS):
+        raise RangeError(f"overlap must be KEEP (0) or PUSH_OUT (1), got {number}")
+    return OVERLAPS[number]
+
+
+def _planar_pose(pose: Pose) -> Floats:
+    """Return x, y and the angle of an upright pose."""
+    place = convert.vector_components("start.position", pose.position)
+    q = pose.orientation
+    turned = RigidTransform.from_quaternion(place, (q.x, q.y, q.z, q.w)).rotation
+    if turned[2, 2] < UPRIGHT:
+        raise RangeError(
+            "start must be upright: the z axes of its frame and the header's must agree"
+        )
+    return np.array([place[0], place[1], np.arctan2(turned[1, 0], turned[0, 0])])
+
+
+def _fill_pose(message: Pose, pose: list[float]) -> None:
+    message.position.x, message.position.y = pose[0], pose[1]
+    message.orientation.z, message.orientation.w = np.sin(pose[2] / 2), np.cos(pose[2] / 2)
+
+
+def _tips(request: SimulatePush.Request) -> tuple[Floats, Any]:
+    """Return the path of the tip (m, 2), and the times along it (m,) [ns], None if none rise."""
+    path: Path = request.tip_path
+    frame = request.header.frame_id
+    if not 2 <= len(path.poses) <= MOST_POSES:
+        raise ShapeError(f"tip_path must have 2 to {MOST_POSES} poses, got {len(path.poses)}")
+    for header in (path.header, *(pose.header for pose in path.poses)):
+        if header.frame_id not in ("", frame):
+            raise FrameError(
+                f"tip_path is in frame {header.frame_id!r}, and the request in {frame!r}: give "
+                "both in one that stands still"
+            )
+    places = as_floats(
+        "tip_path", [(pose.pose.position.x, pose.pose.position.y) for pose in path.poses]
+    )
+    stamps = np.array([convert.nanoseconds(pose.header.stamp) for pose in path.poses])
+    rises = bool((np.diff(stamps) >= 0).all()) and stamps[-1] > stamps[0]
+    return places, stamps if rises else None
+
+
+def _rows(name: str, numbers: array[float], columns: int) -> Floats:
+    """Return a flat field as rows of finite numbers."""
+    flat = as_floats(name, np.frombuffer(numbers, dtype=np.float64) if len(numbers) else [])
+    if flat.size % columns:
+        raise ShapeError(f"{name} must hold {columns} numbers a row, got {flat.size} in all")
+    rows = flat.reshape(-1, columns)
+    if len(rows) > MOST_PUSHES:
+        raise RangeError(f"{name} holds {len(rows)} rows; at most {MOST_PUSHES} are accepted")
+    return rows
+
+
+SERVICES = (
+    Service(SimulatePush, "simulate_push", simulate_one),
+    Service(SimulatePushes, "simulate_pushes", simulate_many),
+)
