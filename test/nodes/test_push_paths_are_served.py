@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import threading
 from array import array
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
 
-from geometry_msgs.msg import Point32, Pose, PoseStamped, WrenchStamped
+from geometry_msgs.msg import Point32, Pose, PoseStamped, TwistStamped, WrenchStamped
 from limit_surface_interfaces.msg import ErrorCode
 from limit_surface_interfaces.srv import SimulatePush, SimulatePushes
 
@@ -263,30 +264,27 @@ def test_what_are_no_pushes_is_refused_with_its_code(served, changes, code, mess
 
 def test_topics_are_served_while_many_pushes_are_simulated(served, ros, client_node):
     node, _, many = served
-    seen = []
-    ros.subscribe(client_node, "/limit_surface/predicted_twist", seen)
+    seen = ros.listen(client_node, TwistStamped, "/limit_surface/predicted_twist")
     publisher = client_node.create_publisher(WrenchStamped, "/limit_surface/wrench", 10)
-    ros.wait(lambda: publisher.get_subscription_count() > 0)
-    del node
+    ros.matched(publisher)
     message = WrenchStamped()
     message.header.frame_id = "object"
     message.wrench.force.x = 5.0
     paths = random_paths(3000)
-    done = []
+    answers = []
 
     def ask():
-        done.append(many(asked_many(np.zeros((3000, 3)), paths)))
+        answers.append(many(asked_many(np.zeros((3000, 3)), paths)))
 
-    import threading
-
-    thread = threading.Thread(target=ask)
-    thread.start()
+    asking = threading.Thread(target=ask)
+    asking.start()
+    ros.wait(lambda: node.endpoints.under_way > 0)
     before_the_end = 0
-    while not done:
-        publisher.publish(message)
+    while node.endpoints.under_way:
         count = len(seen)
-        ros.wait(lambda count=count: len(seen) > count or bool(done))
-        before_the_end += not done
-    thread.join()
-    assert done[0].error_code == ErrorCode.NONE
+        publisher.publish(message)
+        ros.wait(lambda count=count: len(seen) > count)
+        before_the_end += node.endpoints.under_way
+    asking.join()
+    assert answers[0].error_code == ErrorCode.NONE
     assert before_the_end >= 3
