@@ -24,6 +24,7 @@ ROS = {
     "builtin_interfaces",
     "diagnostic_msgs",
     "geometry_msgs",
+    "nav_msgs",
     "rcl_interfaces",
     "std_msgs",
     "std_srvs",

@@ -24,6 +24,7 @@ from limit_surface_ros.nodes import (
     frames,
     model_info,
     planar_input,
+    push_services,
     spin,
     surface_markers,
 )
@@ -94,7 +95,7 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
         self.markers = SurfaceMarkers(self, self._present)
         self._twists = self.endpoints.add_output(TwistStamped, "predicted_twist")
         self._wrenches = self.endpoints.add_output(WrenchStamped, "required_wrench")
-        for service in SERVICES:
+        for service in (*SERVICES, *push_services.SERVICES):
             self.endpoints.serve(service)
         self.endpoints.add_input(WrenchStamped, "wrench", self._predict)
         self.endpoints.add_input(TwistStamped, "twist", self._require)

@@ -279,7 +279,8 @@ class PlanarInput:
         point = convert.vector_components("contact", request.contact)
         normal = convert.vector_components("normal", request.normal)
         velocity = convert.vector_components("velocity", request.velocity)
-        friction = convert.checked_number("friction", request.friction)
+        # From 0 to infinity: `push` looks at it.
+        friction = request.friction
         transform = await self.transform(model, request.header)
         point = transform.point(point).tolist()
         normal = transform.direction(normal).tolist()

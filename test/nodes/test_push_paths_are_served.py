@@ -59,10 +59,10 @@ def asked_one(**changes):
     return request
 
 
-def asked_many(poses, paths, **changes):
+def asked_many(starts, paths, **changes):
     request = SimulatePushes.Request(tip_radius=TIP, friction=FRICTION)
     request.header.frame_id = "table"
-    request.poses = array("d", np.ravel(poses).tolist())
+    request.poses = array("d", np.ravel(starts).tolist())
     request.tip_starts = array("d", paths[:, 0].ravel().tolist())
     request.tip_ends = array("d", paths[:, 1].ravel().tolist())
     for name, value in changes.items():

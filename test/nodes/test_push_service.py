@@ -79,7 +79,7 @@ def test_a_push_in_another_frame_is_the_same_push(pushed):
     ("spoiled", "code"),
     [
         (request([math.nan, 0], [1, 0], 0.3, [1, 0]), ErrorCode.NOT_FINITE),
-        (request([0, 0], [1, 0], math.inf, [1, 0]), ErrorCode.NOT_FINITE),
+        (request([0, 0], [1, 0], math.nan, [1, 0]), ErrorCode.OUT_OF_RANGE),
         (request([0, 0], [1, 0], -0.1, [1, 0]), ErrorCode.OUT_OF_RANGE),
         (request([0, 0], [1, 0], 0.1, [1e300, 0]), ErrorCode.OUT_OF_RANGE),
         (request([0, 0], [0, 0], 0.3, [1, 0]), ErrorCode.ZERO_VECTOR),
