@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.files.surface_file import SurfaceModel
     from limit_surface_ros.motion.outline import Outline
-    from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
 
 # Poses of a path that are accepted: each starts a step anew.
 MOST_POSES = 1000
@@ -48,7 +47,7 @@ _NUMBERS = {mode: getattr(SimulatePush.Response, mode.name) for mode in MODES}
 
 
 async def simulate_one(
-    node: LimitSurfaceNode, request: SimulatePush.Request, response: SimulatePush.Response
+    node: Any, request: SimulatePush.Request, response: SimulatePush.Response
 ) -> None:
     """Answer `~/simulate_push`."""
     model = node.models[request.model]
@@ -92,7 +91,7 @@ async def simulate_one(
 
 
 async def simulate_many(
-    node: LimitSurfaceNode, request: SimulatePushes.Request, response: SimulatePushes.Response
+    node: Any, request: SimulatePushes.Request, response: SimulatePushes.Response
 ) -> None:
     """Answer `~/simulate_pushes`, in steps between which others have their turns."""
     model = node.models[request.model]
