@@ -15,7 +15,7 @@ EXTRAS = {
     "cluster": ["dask", "distributed"],
     "peers": ["cvxpy"],
     "exports": ["casadi", "jax", "mujoco"],
-    "docs": ["sphinx", "myst-parser", "furo", "sphinx-mathjax-offline"],
+    "docs": ["sphinx", "myst-parser", "furo", "sphinx-mathjax-offline", "sphinx-copybutton"],
 }
 
 # Each program's name and the module whose main() it runs.

@@ -15,15 +15,31 @@ project = "limit_surface_ros"
 author = "limit_surface_ros maintainers"
 project_copyright = "limit_surface_ros maintainers, Apache-2.0"
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx-mathjax-offline", "sphinx.ext.napoleon"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx-mathjax-offline",
+    "sphinx_copybutton",
+]
 exclude_patterns = ["_build"]
 myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 3
 
-autodoc_default_options = {"members": True, "member-order": "bysource", "show-inheritance": True}
+autodoc_default_options = {
+    "members": True,
+    "member-order": "bysource",
+    "show-inheritance": True,
+    # What a module takes from another is described there.
+    "ignore-module-all": True,
+}
 autodoc_typehints = "none"
 # Attributes are described in their class and have no entries of their own.
 napoleon_use_ivar = True
+
+# Of a session in Python only what is typed is copied.
+copybutton_prompt_text = r">>> |\.\.\. "
+copybutton_prompt_is_regexp = True
 
 html_theme = "furo"
 html_title = "limit_surface_ros"

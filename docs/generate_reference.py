@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parent.parent
 INTERFACES = ROOT / "limit_surface_interfaces"
-LAYERS = ("surface", "fitting", "decay", "files", "plots")
+LAYERS = ("surface", "decay", "motion", "fitting", "files", "export", "plots")
 # Nodes whose modules hold a NAME and a table SETTINGS.
 NODES = ("limit_surface_node", "decay_node")
 
