@@ -4,8 +4,8 @@
 Starts both nodes in a process of their own and asks the first from this one what a handful of
 loads do to the body of the default model, prints a table, and checks each answer: the load that
 the answered motion needs must do as much work on it as the limit load of the same direction (the
-principle of maximum dissipation, there and back through both services). Then it gives the second
-an onset, prints the falling wrench, and compares the time at which sliding stops with its closed
+principle of maximum dissipation, there and back through both services). It has a tip push the
+body along a path, and compares the end with the batch service. Then it gives the second an onset, prints the falling wrench, and compares the time at which sliding stops with its closed
 form. The exit code tells whether all agree.
 """
 
@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 from geometry_msgs.msg import Twist, TwistStamped, Wrench, WrenchStamped
 from limit_surface_interfaces.srv import ListModels, TwistToWrench, WrenchToTwist
 
-from limit_surface_ros.nodes import convert, demo_decay
+from limit_surface_ros.nodes import convert, demo_decay, demo_push
 from limit_surface_ros.nodes.service_client import ServiceClient
 
 if TYPE_CHECKING:
@@ -121,6 +121,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             demo = Demo(client, namespace)
             agrees = _show(demo)
             push = [3.0 * part for part in demo.limit_load([1.0, 0.0, 0.0])]
+            agrees &= demo_push.show(client, namespace, demo.model.frame_id)
             agrees &= demo_decay.show(client, namespace, demo.model.frame_id, push)
     except (RuntimeError, TimeoutError) as error:
         print(f"demo: {error}", file=sys.stderr)

@@ -41,6 +41,7 @@ from limit_surface_ros.nodes.planar_input import (
     twist_at_origin,
     wrench_at_origin,
 )
+from limit_surface_ros.nodes.push_markers import PushMarkers
 from limit_surface_ros.nodes.settings import Setting
 from limit_surface_ros.nodes.surface_markers import SurfaceMarkers
 from limit_surface_ros.surface.frames import power
@@ -93,6 +94,7 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
         self.input = PlanarInput(self.values, Frames(self, self.values, buffer), self.report)
         self.batches = Batches(self.endpoints)
         self.markers = SurfaceMarkers(self, self._present)
+        self.push_markers = PushMarkers(self)
         self._twists = self.endpoints.add_output(TwistStamped, "predicted_twist")
         self._wrenches = self.endpoints.add_output(WrenchStamped, "required_wrench")
         for service in (*SERVICES, *push_services.SERVICES):

@@ -88,7 +88,7 @@ class Canvas:
         marker.header.frame_id = self.frame
         marker.pose.position.x, marker.pose.position.y = self.model.reference_point
         marker.pose.orientation.w = 1.0
-        marker.color = _color(color)
+        marker.color = color_of(color)
         return marker
 
 
@@ -160,7 +160,7 @@ def contact_marker(canvas: Canvas) -> Marker:
     marker.scale.x = marker.scale.y = marker.scale.z = max(0.02 * canvas.length, size)
     marker.points = points_of(np.column_stack([points, np.zeros(len(share))]))
     marker.colors = [
-        _color(tuple(s * a + (1.0 - s) * b for a, b in zip(VERMILION, BLUE, strict=True)))
+        color_of(tuple(s * a + (1.0 - s) * b for a, b in zip(VERMILION, BLUE, strict=True)))
         for s in share
     ]
     return marker
@@ -232,6 +232,6 @@ def _shaded(brightness: float) -> ColorRGBA:
     return ColorRGBA(r=share * BLUE[0], g=share * BLUE[1], b=share * BLUE[2], a=0.7)
 
 
-def _color(rgb: Iterable[float]) -> ColorRGBA:
+def color_of(rgb: Iterable[float]) -> ColorRGBA:
     red, green, blue = rgb
     return ColorRGBA(r=red, g=green, b=blue, a=1.0)

@@ -52,9 +52,10 @@ async def simulate_one(
     """Answer `~/simulate_push`."""
     model = node.models[request.model]
     tips, stamps = _tips(request)
+    outline = outline_of(model, request)
     run = simulate_push(
         node.input.policy.surface_of(model),
-        outline_of(model, request),
+        outline,
         request.tip_radius,
         request.friction,
         _planar_pose(request.start),
@@ -88,6 +89,7 @@ async def simulate_one(
     response.left = run.left_at is not None
     response.left_at = run.left_at or 0.0
     response.estimated_error = run.error
+    node.push_markers.show(outline, run, response.body_path)
 
 
 async def simulate_many(

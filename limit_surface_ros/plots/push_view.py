@@ -3,16 +3,10 @@
 
 from __future__ import annotations
 
-import io
-import shutil
-import tempfile
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.errors import FileError, MissingExtraError
-from limit_surface_ros.files.atomic_write import write_atomically
 from limit_surface_ros.motion.outcomes import ContactMode
 from limit_surface_ros.plots.canvas import (
     BLACK,
@@ -24,8 +18,11 @@ from limit_surface_ros.plots.canvas import (
     VERMILION,
     new_figure,
 )
+from limit_surface_ros.plots.film import RATE, outline_at, save_film
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -33,7 +30,6 @@ if TYPE_CHECKING:
     from limit_surface_ros.motion.outline import Outline
     from limit_surface_ros.motion.rollout import PushRun
 
-FILMS = (".gif", ".mp4")
 # What stands for each mode, in every part of the picture.
 COLOURS = {
     ContactMode.STICK: GREEN,
@@ -47,9 +43,8 @@ _WORDS = {
     ContactMode.SLIDE_RIGHT: "slides right",
     ContactMode.SEPARATE: "does not push",
 }
-# Outlines drawn on the way, and pictures of a film to the second.
+# Outlines drawn on the way.
 _GHOSTS = 9
-_RATE = 20
 # Length of the largest force, in mean radii of the outline.
 _ARROW = 0.8
 
@@ -75,13 +70,6 @@ def draw_push(run: PushRun, outline: Outline, tip_radius: float, title: str = ""
     return figure
 
 
-def _corners(outline: Outline, pose: Floats) -> Floats:
-    """Return an outline at a pose as a closed polygon (n, 2) [mm]."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    points = outline.drawn() @ np.array([[c, s], [-s, c]]) + pose[:2]
-    return 1e3 * np.concatenate([points, points[:1]])
-
-
 def _tip_at(run: PushRun, length: float) -> Floats:
     return np.array([np.interp(length, run.path_lengths, each) for each in run.tips.T])
 
@@ -99,7 +87,7 @@ def _draw_way(axes: Axes, run: PushRun, outline: Outline, tip_radius: float) -> 
     lengths = np.linspace(0.0, run.path_lengths[-1], _GHOSTS)
     for place, (length, pose) in enumerate(zip(lengths, run.poses_at(lengths), strict=True)):
         last = place == _GHOSTS - 1
-        x, y = _corners(outline, pose).T
+        x, y = 1e3 * outline_at(outline.drawn(), pose).T
         faint = 0.2 + 0.6 * place / _GHOSTS
         axes.plot(x, y, color=BLACK if last else SKY, alpha=1.0 if last else faint, linewidth=1.0)
         centre = 1e3 * _tip_at(run, length)
@@ -168,42 +156,34 @@ def write_film(
         run: The push.
         outline: Of the body.
         tip_radius: Of the pusher [m].
-        path: The file; its suffix is one of `FILMS`.
+        path: The file; its suffix is one of `film.FILMS`.
         seconds: How long the film is [s].
 
     Raises:
-        FileError: The suffix is another, or the file cannot be written.
-        MissingExtraError: matplotlib is not installed, or for an MP4 ffmpeg.
+        FileError, MissingExtraError: As `film.save_film`.
     """
-    path = Path(path)
-    if path.suffix.lower() not in FILMS:
-        raise FileError(f"{path}: films end in {' or '.join(FILMS)}, got {path.suffix!r}")
     with new_figure(5.0, 4.5) as figure:
-        try:
-            from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
-            from matplotlib.patches import Circle
-        except ImportError:
-            raise MissingExtraError("pillow", "plots") from None
-        if path.suffix.lower() == ".mp4" and not shutil.which("ffmpeg"):
-            raise FileError(f"{path}: an MP4 needs the program ffmpeg: install it, or take a .gif")
-        axes = figure.add_subplot()
-        count = max(2, round(_RATE * seconds))
+        from matplotlib.patches import Circle
+
+        count = max(2, round(RATE * seconds))
         lengths = np.linspace(0.0, run.path_lengths[-1], count)
         poses = run.poses_at(lengths)
-        seen = np.concatenate([_corners(outline, pose) for pose in poses[:: max(1, count // 20)]])
+        corners = outline.drawn()
+        seen = 1e3 * np.concatenate([outline_at(corners, pose) for pose in poses])
         room = 1e3 * tip_radius + 5.0
         low = np.minimum(seen.min(axis=0), 1e3 * run.tips.min(axis=0)) - room
         high = np.maximum(seen.max(axis=0), 1e3 * run.tips.max(axis=0)) + room
+        axes = figure.add_subplot()
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         axes.set(xlabel="x [mm]", ylabel="y [mm]")
-        axes.plot(*_corners(outline, run.poses[0]).T, color=SKY, linewidth=0.8)
+        axes.plot(*(1e3 * outline_at(corners, run.poses[0]).T), color=SKY, linewidth=0.8)
         axes.plot(*(1e3 * run.tips.T), color=ORANGE, linewidth=0.8, linestyle="--")
         (body,) = axes.plot([], [], color=BLACK)
         tip = Circle((0.0, 0.0), max(1e3 * tip_radius, 0.5), color=ORANGE)
         axes.add_patch(tip)
 
         def show(place: int) -> list[object]:
-            body.set_data(*_corners(outline, poses[place]).T)
+            body.set_data(*(1e3 * outline_at(corners, poses[place]).T))
             tip.center = tuple(1e3 * _tip_at(run, lengths[place]))
             after = np.searchsorted(run.path_lengths, lengths[place], side="right") - 1
             mode = run.modes[int(np.clip(after, 0, len(run.modes) - 1))]
@@ -211,10 +191,4 @@ def write_film(
             axes.set_title(_WORDS[mode])
             return [body, tip]
 
-        film = FuncAnimation(figure, show, frames=count, interval=1000.0 / _RATE)
-        with tempfile.TemporaryDirectory() as folder:
-            made = Path(folder) / f"film{path.suffix.lower()}"
-            is_gif = path.suffix.lower() == ".gif"
-            writer = PillowWriter(fps=_RATE) if is_gif else FFMpegWriter(fps=_RATE)
-            film.save(made, writer=writer, dpi=90)
-            write_atomically(path, io.BytesIO(made.read_bytes()).getvalue())
+        save_film(figure, show, count, path)

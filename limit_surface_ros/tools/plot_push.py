@@ -17,7 +17,8 @@ from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.files.yaml_reader import read_yaml
 from limit_surface_ros.motion.rollout import DEFAULT_ACCURACY, OVERLAPS, simulate_push
 from limit_surface_ros.plots.canvas import save_figure
-from limit_surface_ros.plots.push_view import FILMS, draw_push, write_film
+from limit_surface_ros.plots.film import FILMS
+from limit_surface_ros.plots.push_view import draw_push, write_film
 from limit_surface_ros.tools.common.options import (
     add_picture_options,
     check_output,

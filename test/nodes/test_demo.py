@@ -35,3 +35,10 @@ def test_the_demonstration_shows_a_wrench_that_falls_until_sliding_stops(output)
     assert set(rows) == {"slides", "rests"}
     found, closed = re.search(r"stops after (\S+) s; .* says (\S+) s", output).groups()
     assert float(found) == pytest.approx(float(closed), abs=1e-6)
+
+
+def test_the_demonstration_pushes_the_body_along_a_path(output):
+    rows = re.findall(r"^ +\d+\.\d{2}(?: +-?\d+\.\d{3}){3}  (\w[\w ]+)$", output, re.MULTILINE)
+    assert rows[0] == "does not push"
+    assert {"sticks", "slides left", "slides right"} & set(rows)
+    assert "it ends where the batch of pushes says" in output

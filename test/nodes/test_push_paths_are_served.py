@@ -15,6 +15,9 @@ pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not b
 from geometry_msgs.msg import Point32, Pose, PoseStamped, TwistStamped, WrenchStamped
 from limit_surface_interfaces.msg import ErrorCode
 from limit_surface_interfaces.srv import SimulatePush, SimulatePushes
+from nav_msgs.msg import Path
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from visualization_msgs.msg import MarkerArray
 
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
 from limit_surface_ros.motion.outline import Polygon
@@ -288,3 +291,22 @@ def test_topics_are_served_while_many_pushes_are_simulated(served, ros, client_n
     asking.join()
     assert answers[0].error_code == ErrorCode.NONE
     assert before_the_end >= 3
+
+
+def test_the_last_push_is_shown_also_to_who_looks_later(served, ros, client_node):
+    _, one, _ = served
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    answer = one(asked_one())
+    seen = ros.listen(client_node, MarkerArray, "/limit_surface/push", latched)
+    paths = ros.listen(client_node, Path, "/limit_surface/push_path", latched)
+    ros.wait(lambda: seen and paths)
+    assert paths[0] == answer.body_path
+    shown = seen[0].markers
+    assert {marker.ns for marker in shown} == {"", "ghosts", "tip", "contacts", "forces"}
+    assert all(marker.header.frame_id == "table" for marker in shown)
+    ghosts = [marker for marker in shown if marker.ns == "ghosts"]
+    first = np.array([(point.x, point.y) for point in ghosts[0].points])
+    np.testing.assert_allclose(first[:4], OUTLINE.vertices, atol=1e-12)
+    # A later push is shown at once.
+    one(asked_one(friction=0.1))
+    ros.wait(lambda: len(seen) > 1)
