@@ -5,8 +5,9 @@ Starts both nodes in a process of their own and asks the first from this one wha
 loads do to the body of the default model, prints a table, and checks each answer: the load that
 the answered motion needs must do as much work on it as the limit load of the same direction (the
 principle of maximum dissipation, there and back through both services). It has a tip push the
-body along a path, and compares the end with the batch service. Then it gives the second an onset, prints the falling wrench, and compares the time at which sliding stops with its closed
-form. The exit code tells whether all agree.
+body along a path, and compares the end with the batch service. Then it gives the second an onset,
+prints the falling wrench, and compares the time at which sliding stops with its closed form. The
+exit code tells whether all agree.
 """
 
 from __future__ import annotations

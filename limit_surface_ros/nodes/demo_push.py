@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The part of the demonstration that pushes the body along a path, and asks twice where it ends."""
+"""The part of the demonstration that pushes the body along a path and asks twice for its end."""
 
 from __future__ import annotations
 

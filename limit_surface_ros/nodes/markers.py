@@ -233,5 +233,6 @@ def _shaded(brightness: float) -> ColorRGBA:
 
 
 def color_of(rgb: Iterable[float]) -> ColorRGBA:
+    """Return an opaque colour of three numbers from 0 to 1."""
     red, green, blue = rgb
     return ColorRGBA(r=red, g=green, b=blue, a=1.0)

@@ -111,7 +111,7 @@ def push_markers(shown: Shown) -> list[Marker]:
 
 
 def _forces(shown: Shown, places: Floats) -> Marker:
-    """Return the forces at some places as lines from the contacts, the largest of a fixed length."""
+    """Return the forces at some places as lines from the contacts, the largest of one length."""
     run = shown.run
     c, s = np.cos(run.poses[places, 2]), np.sin(run.poses[places, 2])
     fx, fy = run.wrenches[places, :2].T

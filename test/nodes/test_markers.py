@@ -108,7 +108,7 @@ def test_without_a_scale_the_surface_is_about_as_large_as_the_body():
 def test_the_rviz_configuration_shows_what_the_node_publishes():
     path = Path(__file__).parents[2] / "config" / "limit_surface.rviz"
     manager = yaml.safe_load(path.read_text())["Visualization Manager"]
-    (display,) = [d for d in manager["Displays"] if d["Class"].endswith("MarkerArray")]
+    (display, _) = [d for d in manager["Displays"] if d["Class"].endswith("MarkerArray")]
     assert display["Topic"]["Value"] == "/limit_surface/surface"
     assert display["Topic"]["Durability Policy"] == "Transient Local"
     shown = {markers.SURFACE, markers.CONTACT, *markers.OF_A_LOAD}
