@@ -4,8 +4,8 @@
     scripts/with_ros --with extras -- python3 examples/gallery/predicted_push.py push.png
 
 The body is an L on an even patch. Twenty-five pushes of it are simulated, with noise as in
-recordings; an ellipsoid and the automatic fit learn from them. A pusher then takes a path that none
-of them knew, and the exact patch says where the body really ends.
+recordings; an ellipsoid and the automatic fit learn from them. A pusher then takes a path that
+none of them knew, and the exact patch says where the body really ends.
 """
 
 from __future__ import annotations
