@@ -197,6 +197,7 @@ class ExponentialSum:
         Raises:
             RangeError: The level is negative or not a finite number.
             UnstableError: A rate other than 0 does not decay, so that no time can be named.
+            SolverError: The sum oscillates too fast for its decay to be searched.
         """
         height = float(as_floats("level", level))
         if height < 0.0:

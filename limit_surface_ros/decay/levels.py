@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from limit_surface_ros.bracket import root_bracket
+from limit_surface_ros.errors import SolverError
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
@@ -24,6 +25,8 @@ VANISHED = 800.0
 _CELLS = 128
 # Intervals whose cells are kept, a few kilobytes each.
 _KEPT = 256
+# Intervals that one search may look at, some 20 microseconds each.
+_MOST_INTERVALS = 20_000
 # Part of the whole interval to which a time is found.
 _RESOLUTION = 1e-15
 # Phase in a cell from which on a term is as good as vanished in the next.
@@ -54,6 +57,7 @@ class LevelSearch:
         )
         # Times, each twice the one before, and sum |c| exp(Re lambda t), as far as asked for.
         self._envelope: list[tuple[float, float]] = []
+        self._searched = 0
         # Cells of the intervals that levels led to: alike levels lead to the same ones.
         self._known: dict[tuple[float, float], _Cells] = {}
 
@@ -66,6 +70,7 @@ class LevelSearch:
         if not self._sizes.any():
             return None
         end = self._time_of_envelope(level - abs(self._constant))
+        self._searched = 0
         return self._last_within(0.0, end, level, end * _RESOLUTION)
 
     def supremum(self, start: float) -> float:
@@ -141,6 +146,12 @@ class LevelSearch:
         self, start: float, end: float, level: float, resolution: float
     ) -> float | None:
         """Return the last time in [start, end] at which |x| exceeds a level, if there is one."""
+        self._searched += 1
+        if self._searched > _MOST_INTERVALS:
+            raise SolverError(
+                f"the last time at which |x| exceeds {level:g} could not be told on "
+                f"{_MOST_INTERVALS} intervals: the sum oscillates too fast for its decay"
+            )
         cells = self._cells(start, end)
         width = (end - start) / _CELLS
         for cell in np.flatnonzero(cells.highest > level)[::-1].tolist():
@@ -174,10 +185,12 @@ class LevelSearch:
         values = np.abs(self._at(times))
         # In units of the width, so that no square of a rate runs out of numbers.
         phases = np.minimum(np.abs(self._rates) * width, _FASTEST)
-        curvatures = np.exp(np.multiply.outer(times[:-1], self._rates.real)) @ (
-            self._sizes * phases**2
-        )
-        highest = np.maximum(values[:-1], values[1:]) + curvatures / 8.0
+        envelopes = np.exp(np.multiply.outer(times[:-1], self._rates.real)) * self._sizes
+        curvatures = envelopes @ phases**2
+        ends = np.maximum(values[:-1], values[1:])
+        # The envelope is the better bound where the phase turns far within a cell.
+        within = np.minimum(ends + curvatures / 8.0, abs(self._constant) + envelopes.sum(axis=1))
+        highest = np.maximum(ends, within)
         return _Cells(times, values, curvatures, highest)
 
     def _at_one(self, time: float) -> float:

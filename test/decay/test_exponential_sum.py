@@ -247,3 +247,12 @@ def test_a_supremum_needs_a_sum_that_settles():
         ExponentialSum([0.1], [1.0]).supremum()
     with pytest.raises(RangeError):
         ExponentialSum([-0.1], [1.0]).supremum(-1.0)
+
+
+@pytest.mark.parametrize("others", [[], [-0.5], [-1.1 + 2.9e6j]])
+def test_levels_of_fast_oscillations_are_found_without_looking_at_each(others):
+    x = ExponentialSum([-1.0 + 3e6j, *others], [1.0] + [-0.3] * len(others))
+    time = x.time_to_level(0.01)
+    near = time + np.linspace(-1e-5, 1e-5, 2001)
+    assert np.abs(x(near[:1001])).max() > 0.01 * (1.0 - 1e-4)
+    assert np.abs(x(near[1001:])).max() <= 0.01 * (1.0 + 1e-9)
