@@ -104,6 +104,11 @@ class Response:
         return self._estimator.residual / self.start
 
     @property
+    def noise(self) -> float:
+        """Standard deviation of a measurement, in the unit of x, the fit's error included."""
+        return self._options.noise
+
+    @property
     def known_until(self) -> float:
         """Time [s] after which nothing is stated because the model itself does not fit."""
         verdict = self.verdict

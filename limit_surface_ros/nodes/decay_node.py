@@ -8,14 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from geometry_msgs.msg import Vector3Stamped, WrenchStamped
-from limit_surface_interfaces.msg import DecayForecast
-from limit_surface_interfaces.srv import (
-    DescribeModel,
-    EvaluateDecay,
-    ListDecays,
-    PredictStop,
-    TimeToLevel,
-)
+from limit_surface_interfaces.msg import DecayForecast, TimeLeft
+from limit_surface_interfaces.srv import DescribeModel, ListDecays, PredictStop
 
 from limit_surface_ros.decay.estimation import EstimationOptions
 from limit_surface_ros.decay.response import onset_value
@@ -23,8 +17,15 @@ from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.decay_file import DecayModel, read_decay_model
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.motion.holding import holds_from
-from limit_surface_ros.nodes import convert, frames, model_info, planar_input, spin
-from limit_surface_ros.nodes.batches import Batches, empty_rows
+from limit_surface_ros.nodes import (
+    convert,
+    frames,
+    model_info,
+    planar_input,
+    running_decay,
+    spin,
+)
+from limit_surface_ros.nodes.batches import Batches
 from limit_surface_ros.nodes.convert import SECOND, nanoseconds
 from limit_surface_ros.nodes.endpoints import Service
 from limit_surface_ros.nodes.model_host import model_settings
@@ -42,6 +43,8 @@ NAME = "decay"
 # A stamp later than this is no clock a little ahead [ns]: of a measurement it is wrong, an onset
 # may be meant so.
 LATEST_AHEAD = SECOND
+# Measurements from one look at what they say of the model to the next.
+VERDICT_EVERY = 10
 SETTINGS = (
     *model_settings("config/decay", "decay models"),
     *model_settings(
@@ -79,6 +82,13 @@ SETTINGS = (
         maximum=1.0,
     ),
     Setting(
+        "span_factor",
+        3.0,
+        "Bounds reach so many times as far as was measured, where the model itself does not fit",
+        minimum=1.0,
+        maximum=1e9,
+    ),
+    Setting(
         "outlier_gate",
         5.0,
         "A measurement further from its prediction than so many standard deviations is an outlier",
@@ -92,13 +102,7 @@ SETTINGS = (
         minimum=1e-9,
         maximum=1e9,
     ),
-    Setting(
-        "max_times",
-        1_000_000,
-        "Times that ~/evaluate answers; others are served between its slices",
-        minimum=1,
-        maximum=10_000_000,
-    ),
+    *running_decay.SETTINGS,
     *frames.SETTINGS,
     *planar_input.SETTINGS,
 )
@@ -111,6 +115,7 @@ class DecayNode(ModelNode[DecayModel]):
         surfaces: Limit surfaces of the bodies whose stop is predicted.
         input: Messages as these surfaces take them.
         batches: Runs what takes long.
+        onset: The last onset that came, running or over; None before the first.
 
     Args:
         buffer: What transforms are looked up in, in place of a tf2 buffer of the node's own.
@@ -131,18 +136,24 @@ class DecayNode(ModelNode[DecayModel]):
         self._frames = frames.Frames(self, self.values, buffer)
         self.batches = Batches(self.endpoints)
         self.input = PlanarInput(self.values, self._frames, self.report)
-        self._onset: Onset | None = None
+        self.onset: Onset | None = None
         self._forecast_time = 0
         self._forecast_samples = 0
         self._forecasts = self.endpoints.add_output(
-            DecayForecast, "forecast", latched=True, unbounded=("bounds", "end_time")
+            DecayForecast,
+            "forecast",
+            latched=True,
+            unbounded=("bounds", "end_time", "known_until"),
         )
         self._stream = OnsetStream(
             self,
             self.endpoints.add_output(WrenchStamped, "wrench", depth=100),
             self.endpoints.add_output(Vector3Stamped, "value", depth=100),
-            self._correct_forecast,
+            self._advance,
             self._forget_measurements,
+        )
+        self._time_left = self.endpoints.add_output(
+            TimeLeft, "time_left", depth=100, unbounded=("time_left", "end_time")
         )
         self.values.on_change(["rate", "stop_below"], self._prepare_stream)
         self.endpoints.add_input(WrenchStamped, "onset", self._begin, stream=False)
@@ -153,7 +164,7 @@ class DecayNode(ModelNode[DecayModel]):
     def describe(self) -> dict[str, str]:
         """Return what diagnostics say beside counts and times."""
         told = super().describe() | {"surface": self.surfaces.models.default}
-        onset = self._onset
+        onset = self.onset
         if onset is None:
             return told | {"onset": "none yet"}
         response = onset.response
@@ -163,6 +174,11 @@ class DecayNode(ModelNode[DecayModel]):
             "outliers": str(response.outliers),
         }
         if response.samples:
+            verdict = response.verdict
+            told["verdict"] = verdict.reason or (
+                f"{verdict.family}: amplitude {verdict.amplitude:.3g}, rate {verdict.rate:.3g}, "
+                f"delay {verdict.delay:.3g} s" + ", sign reversed" * verdict.reversed
+            )
             told["residual"] = f"{response.residual:.3g} of the onset"
             told["off_axis"] = f"{onset.off_axis:.3g} of the onset"
         return told
@@ -172,9 +188,10 @@ class DecayNode(ModelNode[DecayModel]):
             noise=self.values["measurement_noise"],
             forgetting=self.values["forgetting"],
             gate=self.values["outlier_gate"],
+            span_factor=self.values["span_factor"],
         )
         onset = Onset(message, self.models[""], self._now(), options, self.values["torque_length"])
-        self._onset = onset
+        self.onset = onset
         self._publish_forecast()
         self._start_stream()
         self._report_odd_time()
@@ -184,7 +201,7 @@ class DecayNode(ModelNode[DecayModel]):
 
         The one is waited for, of the other nothing is published; both are forecast.
         """
-        age = (self._now() - self._onset.start) * 1e-9
+        age = (self._now() - self.onset.start) * 1e-9
         if -age * SECOND > LATEST_AHEAD:
             self.report(
                 "onset in the future",
@@ -200,7 +217,7 @@ class DecayNode(ModelNode[DecayModel]):
 
     async def _measure(self, message: WrenchStamped) -> None:
         load = np.array(convert.wrench_components(message.wrench))
-        onset = self._onset
+        onset = self.onset
         if onset is None or not self._stream.running:
             return
         now = self._now()
@@ -212,7 +229,7 @@ class DecayNode(ModelNode[DecayModel]):
         if stamp < onset.start:
             return
         transform = await self._frames.to_frame(onset.message.header.frame_id, message.header)
-        if self._onset is not onset:
+        if self.onset is not onset:
             # Another came while this one's measurement waited for its transform.
             return
         if transform is not None:
@@ -223,19 +240,50 @@ class DecayNode(ModelNode[DecayModel]):
                 f"a measurement is {onset.response.residual:.3g} of the onset off its prediction "
                 "and counts for nothing",
             )
+        self._report_verdict(onset)
+        self._correct_forecast(now)
+
+    def _report_verdict(self, onset: Onset) -> None:
+        """Tell of measurements that no response near the model follows, and of a reversed sign."""
+        if onset.response.samples % VERDICT_EVERY:
+            return
+        verdict = onset.response.verdict
+        if verdict.reason:
+            self.report("model does not fit", f"{verdict.reason} (model {onset.model.name})")
+        elif verdict.reversed:
+            self.report(
+                "sign reversed",
+                "measurements have the other sign than the onset "
+                f"({verdict.amplitude:.3g} of it): is a sensor mounted the other way round?",
+            )
+
+    def _advance(self, now: int) -> None:
+        """Publish how long the onset still takes beside each of its wrenches."""
+        onset, end = self.onset, self._stream.end
+        elapsed = (now - onset.start) * 1e-9
+        message = TimeLeft(
+            time_left=max(0.0, end - elapsed),
+            end_time=end,
+            fraction=float(onset.response.fractions(max(0.0, elapsed))),
+            samples=onset.response.samples,
+            fits=onset.response.verdict.fits,
+        )
+        message.header.frame_id = onset.message.header.frame_id
+        convert.fill_stamp(message.header.stamp, now)
+        self._time_left.publish(message)
         self._correct_forecast(now)
 
     def _correct_forecast(self, now: int) -> None:
         """Publish what has been learnt since the last forecast, but not too often."""
         if (now - self._forecast_time) * 1e-9 < self.values["forecast_period"]:
             return
-        if self._onset.response.samples != self._forecast_samples:
+        if self.onset.response.samples != self._forecast_samples:
             self._publish_forecast()
             self._stream.end_at(self._end())
 
     def _forget_measurements(self) -> None:
         """What was measured later than it is now has not happened yet."""
-        response = self._onset.response
+        response = self.onset.response
         corrected = response.samples > 0
         response.forget()
         if corrected:
@@ -243,9 +291,9 @@ class DecayNode(ModelNode[DecayModel]):
             self._stream.end_at(self._end())
 
     def _publish_forecast(self) -> None:
-        onset, response = self._onset, self._onset.response
+        onset, response = self.onset, self.onset.response
         times = np.linspace(0.0, self.values["horizon"], self.values["forecast_points"])
-        span = onset.model.time_span
+        span, verdict = onset.model.time_span, response.verdict
         self._forecasts.publish(
             DecayForecast(
                 header=onset.message.header,
@@ -259,16 +307,24 @@ class DecayNode(ModelNode[DecayModel]):
                 bound_until=span[1],
                 end_time=self._end(),
                 samples=response.samples,
+                fits=verdict.fits,
+                reason=verdict.reason,
+                family=verdict.family,
+                amplitude=verdict.amplitude,
+                rate=verdict.rate,
+                delay=verdict.delay,
+                reversed=verdict.reversed,
+                known_until=response.known_until,
             )
         )
         self._forecast_time, self._forecast_samples = self._now(), response.samples
 
     def _end(self) -> float:
-        return self._onset.response.time_to_fraction(self.values["stop_below"])
+        return self.onset.response.time_to_fraction(self.values["stop_below"])
 
     def _start_stream(self) -> None:
-        if self._onset is not None:
-            self._stream.start(self._onset, self.values["rate"], self._end())
+        if self.onset is not None:
+            self._stream.start(self.onset, self.values["rate"], self._end())
 
     def _prepare_stream(self, values: Mapping[str, Any]) -> Callable[[], None]:
         return self._start_stream
@@ -289,34 +345,6 @@ def describe_model(
     response.name = model.name
     response.summary = model_info.decay_summary(model)
     response.fit = model_info.provenance(model)
-
-
-async def evaluate(
-    node: DecayNode, request: EvaluateDecay.Request, response: EvaluateDecay.Response
-) -> None:
-    """Answer `~/evaluate`."""
-    model, most = node.models[request.model], node.values["max_times"]
-    if len(request.times) > most:
-        raise RangeError(
-            f"times holds {len(request.times)} times; at most {most} are accepted, see max_times"
-        )
-    flat, values = empty_rows(len(request.times), 1)
-
-    def work(part: slice) -> None:
-        values[part] = model.sum(np.asarray(request.times[part]))
-
-    await node.batches.run(len(request.times), work)
-    response.values = flat
-    response.bound = model.max_error
-    response.bound_from, response.bound_until = model.time_span
-
-
-def time_to_level(
-    node: DecayNode, request: TimeToLevel.Request, response: TimeToLevel.Response
-) -> None:
-    """Answer `~/time_to_level`."""
-    response.time = node.models[request.model].sum.time_to_level(request.level)
-    response.reached = bool(np.isfinite(response.time))
 
 
 async def predict_stop_of_a_body(
@@ -345,8 +373,7 @@ async def predict_stop_of_a_body(
 SERVICES = (
     Service(ListDecays, "list_models", DecayNode.list_models),
     Service(DescribeModel, "describe_model", describe_model),
-    Service(EvaluateDecay, "evaluate", evaluate),
-    Service(TimeToLevel, "time_to_level", time_to_level, unbounded=("time",)),
+    *running_decay.SERVICES,
     Service(
         PredictStop,
         "predict_stop",

@@ -61,7 +61,7 @@ class Onset:
         self.message = message
         fill_stamp(message.header.stamp, self.start)
         self.model = model
-        self.response = Response(model.sum, model.max_error, options)
+        self.response = Response(model.sum, model.max_error, options, model.bounds)
         self.off_axis = 0.0
         weights = 1.0 / np.array([1.0, 1.0, 1.0, length, length, length])
         self._weights = weights / np.linalg.norm(weights * self.load)

@@ -122,6 +122,11 @@ class OnsetStream:
         """Whether an onset is waited for or is dying away."""
         return self._onset is not None and not self._timer.is_canceled()
 
+    @property
+    def end(self) -> float:
+        """Time after the onset at which publishing ends [s]."""
+        return self._end
+
     def start(self, onset: Onset, rate: float, end: float) -> None:
         """Publish an onset's load from now on, in place of the one before.
 

@@ -108,12 +108,12 @@ def test_outliers_and_gaps_are_survived(ros, bench):
 def test_bad_measurements_are_refused_and_change_nothing(bench, late, load, code):
     bench.tick(START + 3 * STEP)
     bench.measure((START + 2 * STEP, measured(START + 2 * STEP)))
-    before = bench.node._onset.response.x
+    before = bench.node.onset.response.x
     bench.measure((START + 2 * STEP + late, load))
     assert bench.refused["measurement", code] == 1
-    assert bench.node._onset.response.x is before
+    assert bench.node.onset.response.x is before
     bench.measure((START + 3 * STEP, measured(START + 3 * STEP)))
-    assert bench.node._onset.response.samples == 2
+    assert bench.node.onset.response.samples == 2
 
 
 def test_a_measurement_in_an_unknown_frame_is_refused_with_both_named(bench):
@@ -129,7 +129,7 @@ def test_measurements_outside_an_onset_are_passed_over(ros, client_node, tmp_pat
     bench.measure((START, LOAD))
     bench.onset(START + SECOND)
     bench.measure((START + STEP, LOAD))
-    assert bench.node._onset.response.samples == 0
+    assert bench.node.onset.response.samples == 0
     assert not bench.refused
 
 
@@ -139,5 +139,5 @@ def test_a_clock_that_jumps_back_forgets_what_has_not_happened_yet(ros, bench):
     bench.tick(START + 10 * STEP)
     ros.wait(lambda: not bench.forecasts[-1].samples)
     bench.measure((START + 10 * STEP, measured(START + 10 * STEP)))
-    assert bench.node._onset.response.samples == 1
+    assert bench.node.onset.response.samples == 1
     assert not bench.refused
