@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from limit_surface_interfaces.srv import EvaluateDecay, FitRunning, TimeToLevel
@@ -20,7 +20,6 @@ from limit_surface_ros.nodes.endpoints import Service
 from limit_surface_ros.nodes.settings import Setting
 
 if TYPE_CHECKING:
-    from limit_surface_ros.nodes.decay_node import DecayNode
     from limit_surface_ros.nodes.onset import Onset
 
 # A model's name is a part of its file's: nothing that leads out of the folder.
@@ -48,7 +47,7 @@ SETTINGS = (
 
 
 async def evaluate(
-    node: DecayNode, request: EvaluateDecay.Request, response: EvaluateDecay.Response
+    node: Any, request: EvaluateDecay.Request, response: EvaluateDecay.Response
 ) -> None:
     """Answer `~/evaluate`."""
     most = node.values["max_times"]
@@ -82,9 +81,7 @@ async def evaluate(
     response.bound_from, response.bound_until = model.time_span
 
 
-def time_to_level(
-    node: DecayNode, request: TimeToLevel.Request, response: TimeToLevel.Response
-) -> None:
+def time_to_level(node: Any, request: TimeToLevel.Request, response: TimeToLevel.Response) -> None:
     """Answer `~/time_to_level`."""
     if request.running:
         response.time = running_onset(node, request.model).response.x.time_to_level(request.level)
@@ -93,9 +90,7 @@ def time_to_level(
     response.reached = bool(np.isfinite(response.time))
 
 
-def fit_running(
-    node: DecayNode, request: FitRunning.Request, response: FitRunning.Response
-) -> None:
+def fit_running(node: Any, request: FitRunning.Request, response: FitRunning.Response) -> None:
     """Answer `~/fit_running`."""
     folder = node.values["learnt_folder"]
     if not folder:
@@ -122,7 +117,7 @@ def fit_running(
     response.samples = onset.response.samples
 
 
-def running_onset(node: DecayNode, model: str) -> Onset:
+def running_onset(node: Any, model: str) -> Onset:
     """Return the node's last onset, running or over.
 
     Raises:
