@@ -69,14 +69,15 @@ async def evaluate(
         response.bounds = convert.flat_of(onset.response.bounds(times))
     else:
         model = node.models[request.model]
-        response.values, values = empty_rows(len(times), 1)
-        response.bounds, bounds = empty_rows(len(times), 1)
+        flat_values, values = empty_rows(len(times), 1)
+        flat_bounds, bounds = empty_rows(len(times), 1)
 
         def work(part: slice) -> None:
             values[part] = model.sum(times[part])
             bounds[part] = model.bounds(times[part])
 
         await node.batches.run(len(times), work)
+        response.values, response.bounds = flat_values, flat_bounds
     response.bound = model.max_error
     response.bound_from, response.bound_until = model.time_span
 
