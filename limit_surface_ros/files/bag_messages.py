@@ -15,7 +15,7 @@ import numpy as np
 
 from limit_surface_ros.errors import FileError
 from limit_surface_ros.files.bag_reader import errors_of_bag
-from limit_surface_ros.files.bag_topic import stamp_of
+from limit_surface_ros.files.bag_topic import LONGEST_NAME, frame_of, stamp_of
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 Parts: TypeAlias = tuple[str, str, tuple[float, ...]]
 _ZERO_NORM, _UNIT_WITHIN, _UPRIGHT = 1e-6, 1e-2, np.cos(np.radians(5.0))
 _MOST_FRAMES = 5
-# Longer names of frames are damage.
-_LONGEST_NAME = 120
 
 
 @dataclass(eq=False)
@@ -59,30 +57,20 @@ class Samples:
         self.values = self.values[kept]
 
 
-def _frame(message: Any) -> str:
-    header = getattr(message, "header", None)
-    return "" if header is None else _name(header.frame_id)
-
-
-def _name(frame: Any) -> str:
-    """Return a frame's name without the slash at its front that ROS 1 allowed."""
-    return str(frame).lstrip("/")[:_LONGEST_NAME]
-
-
 def _child(message: Any) -> str:
-    return _name(getattr(message, "child_frame_id", ""))
+    return str(getattr(message, "child_frame_id", "")).lstrip("/")[:LONGEST_NAME]
 
 
 def _wrench(message: Any) -> Parts:
     load = getattr(message, "wrench", message)
-    return _frame(message), "", (*_vector(load.force), *_vector(load.torque))
+    return frame_of(message), "", (*_vector(load.force), *_vector(load.torque))
 
 
 def _twist(message: Any) -> Parts:
     motion = message
     while hasattr(motion, "twist"):
         motion = motion.twist
-    return _frame(message), "", (*_vector(motion.linear), *_vector(motion.angular))
+    return frame_of(message), "", (*_vector(motion.linear), *_vector(motion.angular))
 
 
 def _pose(message: Any) -> Parts:
@@ -91,7 +79,7 @@ def _pose(message: Any) -> Parts:
         pose = pose.pose
     turn = pose.orientation
     numbers = (*_vector(pose.position), turn.x, turn.y, turn.z, turn.w)
-    return _frame(message), _child(message), numbers
+    return frame_of(message), _child(message), numbers
 
 
 def _planar_pose(message: Any) -> Parts:
@@ -103,7 +91,7 @@ def transform_parts(message: Any) -> Parts:
     """Return the frames and the pose of a TransformStamped."""
     moved, turn = message.transform.translation, message.transform.rotation
     numbers = (*_vector(moved), turn.x, turn.y, turn.z, turn.w)
-    return _frame(message), _child(message), numbers
+    return frame_of(message), _child(message), numbers
 
 
 def _vector(vector: Any) -> tuple[float, float, float]:

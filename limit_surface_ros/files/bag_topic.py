@@ -22,13 +22,17 @@ if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
 
 
+# Of a frame.
+LONGEST_NAME = 120
+
+
 @dataclass(frozen=True, eq=False)
 class TopicRecord:
     """What a bag holds of a topic.
 
     Attributes:
         message_type: Such as "geometry_msgs/msg/WrenchStamped".
-        frame_id: Of the first message's header; empty without one.
+        frame_id: Of all messages' headers; empty without one.
         times: Shape (n,), in order [s]; since the epoch, or since the simulation's start.
         values: Shape (n, k), one column for each field asked for.
     """
@@ -50,8 +54,8 @@ def read_topic(path: str | Path, topic: str, fields: Sequence[str] | None = None
 
     Raises:
         MissingExtraError: rosbags is not installed.
-        FileError: The bag cannot be read, has not that topic or no message on it, or the message
-            has not such a field; the message lists what there is.
+        FileError: The bag cannot be read, has not that topic or no message on it, the message
+            has not such a field, or messages are in several frames; the error lists what there is.
     """
     path = Path(path)
     with open_bag(path) as bag:
@@ -61,11 +65,19 @@ def read_topic(path: str | Path, topic: str, fields: Sequence[str] | None = None
             raise FileError(f"{path}: has no message on {name}")
         first = messages[0][0]
         chosen = _check_fields(path, name, first, fields)
-        # Where there is no stamp, or nobody filled it in, the time of the recording counts.
-        stamps = [stamp_of(message) or recorded for message, recorded in messages]
+        stamps = [stamp_of(message) or 0 for message, _ in messages]
+        if not all(stamps):
+            # There are none, or not all were filled in: the times of the recording count.
+            stamps = [recorded for _, recorded in messages]
         rows = [[_number(message, field) for field in chosen] for message, _ in messages]
-        header = getattr(first, "header", None)
-        frame_id = "" if header is None else str(header.frame_id)
+        frames = {frame_of(message) for message, _ in messages}
+        if len(frames) > 1:
+            listed = ", ".join(sorted(repr(frame)[:60] for frame in frames)[:5])
+            raise FileError(
+                f"{path}: messages on {name} are in {len(frames)} frames, {listed}: numbers in "
+                "different frames are no record of one thing"
+            )
+        frame_id = frames.pop()
     with errors_of_bag(path):
         times = np.array([stamp * 1e-9 for stamp in stamps])
         order = np.argsort(times, kind="stable")
@@ -78,6 +90,13 @@ def stamp_of(message: Any) -> int | None:
     if header is None:
         return None
     return int(header.stamp.sec) * 10**9 + int(header.stamp.nanosec)
+
+
+def frame_of(message: Any) -> str:
+    """Return the frame in a message's header without the slash of ROS 1, "" without a header."""
+    header = getattr(message, "header", None)
+    # Longer names are damage.
+    return "" if header is None else str(header.frame_id).lstrip("/")[:LONGEST_NAME]
 
 
 def _check_fields(

@@ -26,7 +26,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
 _NO_NUMBER = {"nan", "inf", "infinity"}
 # A day and a time of it, or a time alone; see `csv_times`.
 MOMENT = re.compile(
-    r"(?:(?P<day>\d{4}-\d{2}-\d{2})[T ])?(?P<clock>\d{1,2}:\d{2}:\d{2})"
+    r"(?:(?P<day>\d{4}[-/]\d{2}[-/]\d{2})[T ])?(?P<clock>\d{1,2}:\d{2}:\d{2})"
     r"(?:[.,](?P<part>\d+))?\s*(?P<zone>Z|[+-]\d{2}:?\d{2})?",
     re.ASCII,
 )
@@ -97,6 +97,8 @@ class CellFormat:
                 )
         if re.fullmatch(r"[+-]?\d{1,3}([.,' ]\d{3})+([.,]\d+)?", cell):
             return "; marks between thousands are not read"
+        if re.search(r"\d:\d\d", cell):
+            return "; dates and times are read as in 2026-02-28T23:59:59.5, or 23:59:59.5 alone"
         if re.match(r"[+-]?[\d.,]+\s*[A-Za-z\[(%°]", cell):
             return "; a unit belongs into the name of the column, as in 'fx [N]'"
         return ""

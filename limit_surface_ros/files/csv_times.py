@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 # Longer and shorter recordings are no decays that were recorded: the unit is another.
 LONGEST, SHORTEST = 366 * 86400.0, 1e-6
 _DAY, _LONGEST_CELL = 86400, 60
+# Seconds since 1970 of the years 2001 to 2100.
+_THIS_CENTURY = 978307200.0, 4102444800.0
 # Columns that hold nanoseconds since 1970, as rostopic of ROS 1 writes them.
 _NANOSECONDS = re.compile(r"^%time$|header[./]stamp$")
 _SECOND_PART = re.compile(r"^(?P<stem>.*?)(secs?|seconds)$")
@@ -146,7 +148,7 @@ def read_times(table: CsvTable, found: TimeColumns) -> Floats:
     table.keep(rising, "they repeat a time")
     first = exact[0]
     times = np.array([float(exact[row] - first) for row in rising])
-    _check_span(table, found, times)
+    _check_span(table, found, times, float(first))
     return times
 
 
@@ -176,9 +178,8 @@ def _moment(table: CsvTable, row: int, found: TimeColumns) -> Decimal | None:
 def _seconds_of_date(table: CsvTable, row: int, date: re.Match[str]) -> Decimal:
     """Return the seconds of a date and time since the year 1, or of a time since midnight."""
     try:
-        moment = datetime.datetime.fromisoformat(
-            f"{date['day'] or '0001-01-01'}T{date['clock']:0>8}"
-        )
+        day = (date["day"] or "0001-01-01").replace("/", "-")
+        moment = datetime.datetime.fromisoformat(f"{day}T{date['clock']:0>8}")
     except ValueError as error:
         raise FileError(f"{table.path}: line {table.lines[row]}: {error}") from None
     zone = (date["zone"] or "Z").replace("Z", "+0000").replace(":", "")
@@ -204,9 +205,16 @@ def _refuse_order(table: CsvTable, found: TimeColumns, row: int, last: int, equa
     raise FileError(f"{place}: the times must increase: {now} is before {before}{hint}")
 
 
-def _check_span(table: CsvTable, found: TimeColumns, times: Floats) -> None:
+def _check_span(table: CsvTable, found: TimeColumns, times: Floats, first: float) -> None:
     """Refuse times that are in another unit by all appearance."""
     span = float(times[-1])
+    since_1970 = _unit_since_1970(first) if not found.stated else None
+    if since_1970 is not None:
+        raise FileError(
+            f"{table.path}: the times are, by all appearance, {since_1970} since 1970: say so in "
+            f"the name of their column, as in 't [{since_1970}]', or with "
+            f"--time-unit {since_1970}; as seconds they span {_in_words(span)}"
+        )
     if len(times) < 2 or SHORTEST <= span <= LONGEST:
         return
     as_read = "" if not found.stated else f" as {found.told}"
@@ -215,6 +223,14 @@ def _check_span(table: CsvTable, found: TimeColumns, times: Floats) -> None:
         f"{table.path}: the times span {_in_words(span)}{as_read}: are they in {likely}? "
         f"Say so in the name of their column, as in 't [{likely}]', or with --time-unit {likely}"
     )
+
+
+def _unit_since_1970(time: float) -> str | None:
+    """Return the unit in which a time is one of this century since 1970, None if in none."""
+    for unit in ("ms", "us", "ns"):
+        if _THIS_CENTURY[0] < time * units.TIME[unit] < _THIS_CENTURY[1]:
+            return unit
+    return None
 
 
 def _likely_unit(span: float, too_long: bool) -> str:
@@ -228,4 +244,6 @@ def _likely_unit(span: float, too_long: bool) -> str:
 def _in_words(span: float) -> str:
     if span > LONGEST:
         return f"{span / LONGEST:.3g} years"
+    if span > SHORTEST:
+        return f"{span:.4g} s"
     return f"{span * 1e9:.3g} ns"

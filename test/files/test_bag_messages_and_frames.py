@@ -33,6 +33,7 @@ from rosbags.rosbag2 import CompressionMode
 from limit_surface_ros.errors import DataError, FileError
 from limit_surface_ros.files.bag_messages import MOTIONS
 from limit_surface_ros.files.bag_pushes import BagFrames, read_bag_pushes
+from limit_surface_ros.files.bag_topic import read_topic
 from limit_surface_ros.surface.frames import RigidTransform
 
 TF = "tf2_msgs/msg/TFMessage"
@@ -100,6 +101,24 @@ def test_wrenches_in_a_foreign_frame_are_refused_with_the_ways_out(tmp_path):
         read_bag_pushes(bag, "/load", "/motion")
     named = read_bag_pushes(bag, "/load", "/motion", None, BagFrames(body="ft_sensor"))
     assert named.frame_id == "ft_sensor"
+
+
+def test_numbers_in_several_frames_are_no_record(tmp_path):
+    kind, messages = loads()
+    messages[150].header.frame_id = "gripper"
+    bag = write_bag(tmp_path / "bag", {"/load": (kind, messages)})
+    with pytest.raises(FileError, match="messages on /load are in 2 frames, 'gripper', 'object'"):
+        read_topic(bag, "/load", ["wrench.force.x"])
+
+
+def test_positions_in_millimetres_are_named(tmp_path):
+    motion = motion_messages(POSE)
+    for message in motion:
+        message.pose.position.x *= 1000.0
+        message.pose.position.y *= 1000.0
+    bag = write_bag(tmp_path / "bag", {"/load": loads(), "/motion": (POSE, motion)})
+    with pytest.raises(DataError, match="too fast.*are positions in millimetres"):
+        read_bag_pushes(bag, "/load", "/motion")
 
 
 SENSOR = RigidTransform.from_euler([0.1, -0.05, 0.2], [0.0, 0.0, 0.7])

@@ -372,7 +372,12 @@ class _Selected:
         if not self.windows:
             told = ", ".join(f"{count} {rule}" for rule, count in self.dropped.items() if count)
             count = len(times) + not_finite
-            raise DataError(f"no part is a quasi-static push; of {count} wrenches {told}")
+            slip = ""
+            if self.dropped["too fast"] > count / 10 and rules.max_speed < 1.0:
+                usual = float(np.median(speeds.speed[speeds.moving]))
+                if rules.min_speed < 1e-3 * usual < rules.max_speed:
+                    slip = f"; the usual speed is {usual:.3g} m/s: are positions in millimetres?"
+            raise DataError(f"no part is a quasi-static push; of {count} wrenches {told}{slip}")
 
     def _kept(self, motion: Motion, speeds: Speeds, runs: list[_Run]) -> Bools:
         """Return which wrenches the rules for single samples let through, and count the others."""

@@ -61,7 +61,10 @@ def add_bag_options(parser: argparse.ArgumentParser) -> None:
     bags.add_argument("--wrench-topic", metavar="NAME", help=f"of {_short(WRENCHES)}")
     bags.add_argument("--motion-topic", metavar="NAME", help=f"of {_short(MOTIONS)}")
     bags.add_argument(
-        "--body", metavar="FRAME", help="the body's frame, which the model gets; see the manual"
+        "--body",
+        metavar="FRAME",
+        help="the body's frame, which the model gets; default: that of the twists, or the child "
+        "of the poses, or object",
     )
     bags.add_argument(
         "--fixed", metavar="FRAME", help="in which /tf gives the body's poses (for TFMessage)"
