@@ -117,7 +117,7 @@ def test_positions_in_millimetres_are_named(tmp_path):
         message.pose.position.x *= 1000.0
         message.pose.position.y *= 1000.0
     bag = write_bag(tmp_path / "bag", {"/load": loads(), "/motion": (POSE, motion)})
-    with pytest.raises(DataError, match="too fast.*are positions in millimetres"):
+    with pytest.raises(DataError, match=r"too fast.*are positions in millimetres"):
         read_bag_pushes(bag, "/load", "/motion")
 
 

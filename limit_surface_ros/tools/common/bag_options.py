@@ -11,15 +11,11 @@ import numpy as np
 from limit_surface_ros.errors import DataError, RangeError
 from limit_surface_ros.files.bag_frames import transform_of_text
 from limit_surface_ros.files.bag_messages import MOTIONS, WRENCHES
-from limit_surface_ros.files.bag_pushes import (
-    STAMPS,
-    BagFrames,
-    Corrections,
-    Selection,
-    read_bag_pushes,
-)
+from limit_surface_ros.files.bag_pushes import read_bag_pushes
+from limit_surface_ros.files.bag_recording import STAMPS, BagFrames
 from limit_surface_ros.files.recordings.clocks import LARGEST_DELAY
-from limit_surface_ros.files.recordings.pushes import IN_PLANE
+from limit_surface_ros.files.recordings.pushes import IN_PLANE, Corrections
+from limit_surface_ros.files.recordings.selection import Selection
 
 if TYPE_CHECKING:
     import argparse
