@@ -26,13 +26,17 @@ from limit_surface_ros.errors import DataError, RangeError, SolverError
 from limit_surface_ros.fitting.dissipation import (
     DirectionObjective,
 )
-from limit_surface_ros.fitting.factors import floored_parameters
+from limit_surface_ros.fitting.factors import (
+    factors_of_matrices,
+    floored_parameters,
+    parameters_of,
+)
 from limit_surface_ros.fitting.few_pushes.pressure import SmallContacts, fit_pressure
 from limit_surface_ros.fitting.objective import RegularisedObjective
 from limit_surface_ros.fitting.pairs import ScaledPairs, check_support, scale_pairs
 from limit_surface_ros.fitting.power_sum import PowerSumObjective
 from limit_surface_ros.fitting.result import is_sound
-from limit_surface_ros.fitting.search import descend_from_seed
+from limit_surface_ros.fitting.search import descend, descend_from_seed
 from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.sampling import random_loads
 
@@ -54,6 +58,8 @@ _ROBUST_SCALE = 0.2
 _FLOOR = 1e-3
 # Terms that sum up known support points, where there are more of them: those of a patch are many.
 _MOST_KNOWN = 8
+# Share of the loads' second moment that a start has along every direction.
+_THINNEST = 1e-6
 # Pairs that stand for the ellipsoid.
 _ELLIPSOID_PAIRS = 40
 # How much the usual pressure counts: little where nothing is known, much at known points.
@@ -147,7 +153,10 @@ class FitContext:
             SolverError: The surface does not pass through the loads.
         """
         objective = self._objective(recipe)
-        descent = descend_from_seed(objective, self.seed, 0, _PRECISION[recipe.kind])
+        if recipe.kind == "power_sum" and recipe.terms == 1:
+            descent = _ellipsoid(objective, self.scaled)
+        else:
+            descent = descend_from_seed(objective, self.seed, 0, _PRECISION[recipe.kind])
         surface = objective.surface(descent.parameters)
         if not is_sound(surface, self.pairs):
             raise SolverError(f"the fit by {recipe} does not pass through the loads")
@@ -208,10 +217,33 @@ def check_pushes(pairs: ScaledPairs, fewest: int) -> None:
     check_support(pairs, 0)
 
 
+def _ellipsoid(objective: Objective, pairs: ScaledPairs) -> Descent:
+    """Return the best descent of one norm's, from starts that the loads themselves suggest.
+
+    The cost has several minima, and one random start in ten ends in a bad one. Loads that are
+    spread evenly over an ellipsoid f' A f = 1 have the second moment inv(A) / 3; one-sided or few
+    ones have another, for which its diagonal, and that with equal forces, stand in.
+    """
+    moment = 3.0 * pairs.wrenches.T @ (pairs.wrenches * pairs.weights[:, None])
+    moment /= pairs.weights.sum()
+    own = np.diag(moment)
+    force = 0.5 * (own[0] + own[1])
+    sizes = np.array([force, force, max(float(own[2]), _THINNEST * force)])
+    round_ones = (np.diag(np.maximum(own, _THINNEST * own.max())), np.diag(sizes))
+    starts = [
+        np.linalg.inv(each)
+        for each in (moment + _THINNEST * np.trace(moment) * np.eye(3), *round_ones)
+    ]
+    found = [
+        descend(objective, parameters_of(factors_of_matrices(each[None])), _PRECISION["power_sum"])
+        for each in starts
+    ]
+    return min(found, key=lambda each: each.cost)
+
+
 def _ellipsoid_pairs(pairs: ScaledPairs, weight: float, prior_weight: float) -> ScaledPairs:
     """Return pairs spread over the ellipsoid that fits `pairs`, with `prior_weight` in all."""
     objective = PowerSumObjective(pairs, np.array([0.5]), weight, _ROBUST_SCALE)
-    descent = descend_from_seed(objective, 0, 0, _PRECISION["power_sum"])
-    surface = objective.surface(descent.parameters)
+    surface = objective.surface(_ellipsoid(objective, pairs).parameters)
     spread = scale_pairs(random_loads(surface, _ELLIPSOID_PAIRS, 0), pairs.scaling)
     return spread.weighted(np.full(_ELLIPSOID_PAIRS, prior_weight / _ELLIPSOID_PAIRS))

@@ -1,0 +1,337 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How far a real body's motion may be from the predicted one: a distribution of the unit twist.
+
+The residual r of a push, in the plane that touches the sphere of unit scaled twists at the
+prediction u, follows a bivariate Student t of nu degrees of freedom with the scale
+
+    S(f) = e^g (kappa P + a^2 I + b^2 M / (1 + M / m^2))
+
+J = du / d(f/|f|) is the curvature of the surface there. M = J F J' is the scatter that comes of
+every term's friction varying by itself from push to push, F = sum_k g_k g_k' / |G|^2 with the
+loads g_k of the terms and G of them all; J is unbounded at edges and a finite scatter is not,
+hence m. P is the jackknife variance over the models that leave out a fold of the pushes each
+(Efron and Stein 1981, doi:10.1214/aos/1176345462): what the pushes did not tell. Both are evaluated in closed form
+for a dissipation model, J from the bordered Hessian of D.
+
+The constants were fitted once, to 32 recorded sets; g is fitted to the pushes of each model by
+`fitting.few_pushes.calibration`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from limit_surface_ros.checks import as_directions, as_floats
+from limit_surface_ros.errors import DataError, RangeError
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike
+
+    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.base import LimitSurface
+
+VERSION = 1
+# a [rad], b and m as the text above has them, kappa of the linearised jackknife and the value at
+# which that saturates, nu.
+OWN, FRICTION, SATURATED = float(np.radians(3.2)), 0.218, 2.1
+JACKKNIFE, JACKKNIFE_SATURATED = 1.4, 0.5
+FREEDOM = 3.3
+# Nodes along each side of a face of the table, and loads that are looked up in it rather than
+# worked out.
+_NODES = 33
+_FEW = 8
+_TINY = 1e-12
+
+
+def region_quantile(probability: float) -> float:
+    """Return q with r' inv(S) r <= q in that share of pushes.
+
+    Args:
+        probability: Above 0 and below 1.
+
+    Raises:
+        RangeError: The probability is not between 0 and 1.
+
+    Example:
+        >>> round(region_quantile(0.9), 3)
+        10.022
+    """
+    if not 0.0 < probability < 1.0:
+        raise RangeError(f"probability must be above 0 and below 1, got {probability}")
+    return FREEDOM * float((1.0 - probability) ** (-2.0 / FREEDOM) - 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class TwistWithCovariance:
+    """A predicted twist and how far pushes scatter around it.
+
+    Attributes:
+        twist: Predicted twists (vx, vy, omega_z), unit in scaled variables, shape (..., 3).
+        covariance: Of (vx, vy, omega_z) [m/s, m/s, rad/s], shape (..., 3, 3), of rank two: the
+            size of a unit twist does not scatter. A heavy-tailed law's covariance is wider than
+            its 68 % region.
+        half_axes: Of the region in which the unit scaled twist lies at the asked probability
+            [rad], the larger first, shape (..., 2).
+    """
+
+    twist: Floats
+    covariance: Floats
+    half_axes: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class TwistScatter:
+    """The scatter of a dissipation model's twists.
+
+    Attributes:
+        matrices: B_k of the model, in scaled variables, shape (k, 3, 3).
+        folds: Those of the models that left out one fold of the pushes each.
+        log_scale: g.
+
+    Raises:
+        DataError: There are fewer than two folds, or what is given are no matrices.
+    """
+
+    matrices: Floats
+    folds: tuple[Floats, ...]
+    log_scale: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the matrices."""
+        if len(self.folds) < 2:
+            raise DataError(f"a jackknife needs at least two folds, got {len(self.folds)}")
+        for each in (self.matrices, *self.folds):
+            if each.ndim != 3 or each.shape[1:] != (3, 3) or not len(each):
+                raise DataError(f"matrices must have shape (k, 3, 3), got {each.shape}")
+
+    def scale(self, units: Floats) -> Floats:
+        """Return S of unit scaled twists, as 3x3 matrices whose null vector is the twist.
+
+        Args:
+            units: Twists of the model, shape (n, 3).
+
+        Returns:
+            Shape (n, 3, 3).
+        """
+        plane = tangent_basis(units)
+        return np.asarray(plane.transpose(0, 2, 1) @ self.plane_scale(units, plane) @ plane)
+
+    def plane_scale(self, units: Floats, plane: Floats) -> Floats:
+        """Return S in the given bases of the tangent planes, shape (n, 2, 3), as (n, 2, 2)."""
+        loads, parts, hessian = _loads(self.matrices, units)
+        size = np.linalg.norm(loads, axis=1)
+        bordered = np.zeros((len(units), 4, 4))
+        bordered[:, :3, :3] = hessian
+        bordered[:, :3, 3] = bordered[:, 3, :3] = loads
+        turning = size[:, None, None] * (plane @ np.linalg.inv(bordered)[:, :3, :3])
+        through = np.einsum("nij,knj->nki", turning, parts) / size[:, None, None]
+        friction = through.transpose(0, 2, 1) @ through
+        direction = loads / size[:, None]
+        away = []
+        for fold in self.folds:
+            other = _loads(fold, units)[0]
+            away.append(other / np.linalg.norm(other, axis=1, keepdims=True) - direction)
+        shifts = np.einsum("nij,knj->nki", turning, np.array(away))
+        shifts -= shifts.mean(axis=1, keepdims=True)
+        count = len(self.folds)
+        jackknife = (count - 1) / count * (shifts.transpose(0, 2, 1) @ shifts)
+        scale = JACKKNIFE * _saturated(jackknife, JACKKNIFE_SATURATED)
+        scale += FRICTION**2 * _saturated(friction, SATURATED) + OWN**2 * np.eye(2)
+        return np.asarray(np.exp(self.log_scale) * scale)
+
+    def stored(self) -> dict[str, Any]:
+        """Return plain values for a model file's `fit: uncertainty`."""
+        return {
+            "version": VERSION,
+            "log_scale": float(f"{self.log_scale:.6g}"),
+            "fold_matrices": [
+                [[float(f"{entry:.6g}") for entry in each[_UPPER]] for each in fold]
+                for fold in self.folds
+            ],
+        }
+
+
+_UPPER = np.triu_indices(3)
+
+
+def scatter_of(stored: Mapping[str, Any], surface: LimitSurface) -> TwistScatter:
+    """Return the scatter that `TwistScatter.stored` put into a model file.
+
+    Args:
+        stored: What stands under `fit: uncertainty`.
+        surface: The model.
+
+    Raises:
+        DataError: It is of another version or form, or the model is no dissipation.
+    """
+    if not isinstance(surface, Dissipation):
+        raise DataError("uncertainty is that of dissipation models")
+    try:
+        if stored["version"] != VERSION:
+            raise DataError(f"fit: uncertainty has version {stored['version']}, read is {VERSION}")
+        folds = []
+        for fold in stored["fold_matrices"]:
+            entries = as_floats("fold_matrices", fold)
+            matrices = np.zeros((len(entries), 3, 3))
+            matrices[:, _UPPER[0], _UPPER[1]] = matrices[:, _UPPER[1], _UPPER[0]] = entries
+            folds.append(matrices)
+        scale = float(as_floats("log_scale", stored["log_scale"]))
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise DataError(f"fit: uncertainty is not what fits write: {error}") from None
+    return TwistScatter(surface.matrices, tuple(folds), scale)
+
+
+@dataclass(frozen=True, eq=False)
+class UncertainSurface:
+    """A dissipation model with the scatter of its twists.
+
+    Attributes:
+        surface: The model.
+        scatter: Of its unit twists.
+
+    Example:
+        >>> import numpy as np
+        >>> from limit_surface_ros.surface.kinds.dissipation import Dissipation
+        >>> sphere = np.eye(3)[None]
+        >>> uncertain = UncertainSurface(Dissipation(sphere), TwistScatter(sphere, (sphere,) * 5))
+        >>> answer = uncertain.twist_with_covariance([2.0, 0.0, 0.0], probability=0.9)
+        >>> answer.half_axes.round(3).tolist()
+        [0.177, 0.177]
+    """
+
+    surface: LimitSurface
+    scatter: TwistScatter
+
+    def twist_with_covariance(
+        self, wrench: ArrayLike, probability: float = 0.9
+    ) -> TwistWithCovariance:
+        """Return twists with their covariances and the half-axes of a region.
+
+        A few loads are looked up in a table that the first call makes (some tenths of a second,
+        also by `prepare`); it is within 2 % of the spread but next to edges of the surface.
+
+        Args:
+            wrench: Shape (..., 3), (fx, fy, tau_z) [N, N, N m].
+            probability: Of the region whose half-axes are asked for.
+
+        Raises:
+            RangeError: The probability is not between 0 and 1.
+            ZeroVectorError: A wrench is zero.
+        """
+        quantile = region_quantile(probability)
+        wrenches = as_directions("wrench", wrench)
+        twists = np.asarray(self.surface.twist_of_wrench(wrenches))
+        unit = self.surface.scaling.twist_unit
+        rows = (twists / unit).reshape(-1, 3)
+        if len(rows) <= _FEW:
+            loads = (wrenches / self.surface.scaling.wrench_unit).reshape(-1, 3)
+            scales = self._looked_up(loads, rows)
+        else:
+            scales = self.scatter.scale(rows)
+        # One eigenvalue is 0: the others follow from the trace and that of the square.
+        middle = 0.5 * np.trace(scales, axis1=1, axis2=2)
+        squares = np.einsum("nij,nji->n", scales, scales)
+        root = np.sqrt(np.maximum(0.5 * squares - middle**2, 0.0))
+        values = np.stack([middle + root, np.maximum(middle - root, 0.0)], axis=1)
+        covariances = FREEDOM / (FREEDOM - 2.0) * scales * unit[:, None] * unit
+        shape = twists.shape[:-1]
+        return TwistWithCovariance(
+            twist=twists,
+            covariance=covariances.reshape(*shape, 3, 3),
+            half_axes=np.sqrt(quantile * values).reshape(*shape, 2),
+        )
+
+    def prepare(self) -> None:
+        """Make the table; later calls do not wait for it."""
+        _ = self._table
+
+    @cached_property
+    def _table(self) -> Floats:
+        """S over directions of load: three faces of a cube, S(-f) = S(f), shape (3, n, n, 9)."""
+        side = np.linspace(-1.0, 1.0, _NODES)
+        x, y = np.meshgrid(side, side, indexing="ij")
+        ones = np.ones_like(x)
+        faces = np.stack(
+            [
+                np.stack([ones, x, y], axis=-1),
+                np.stack([x, ones, y], axis=-1),
+                np.stack([x, y, ones], axis=-1),
+            ]
+        ).reshape(-1, 3)
+        scaling = self.surface.scaling
+        twists = self.surface.twist_of_wrench(faces * scaling.wrench_unit) / scaling.twist_unit
+        return self.scatter.scale(np.asarray(twists)).reshape(3, _NODES, _NODES, 9)
+
+    def _looked_up(self, loads: Floats, units: Floats) -> Floats:
+        """Return S of a few scaled loads with their unit twists, shape (n, 3, 3)."""
+        table, scales = self._table, np.empty((len(loads), 3, 3))
+        half = 0.5 * (_NODES - 1)
+        for row, (fx, fy, tau) in enumerate(loads.tolist()):
+            sizes = (abs(fx), abs(fy), abs(tau))
+            face = sizes.index(max(sizes))
+            if face == 0:
+                along, first, second = fx, fy, tau
+            elif face == 1:
+                along, first, second = fy, fx, tau
+            else:
+                along, first, second = tau, fx, fy
+            x, y = half * (1.0 + first / along), half * (1.0 + second / along)
+            i, j = min(int(x), _NODES - 2), min(int(y), _NODES - 2)
+            x, y = x - i, y - j
+            weights = ((1.0 - x) * (1.0 - y), (1.0 - x) * y, x * (1.0 - y), x * y)
+            scales[row] = np.dot(weights, table[face, i : i + 2, j : j + 2].reshape(4, 9)).reshape(
+                3, 3
+            )
+        # Between nodes the twist is another one: the scatter is in its plane.
+        off = np.eye(3) - units[:, :, None] * units[:, None, :]
+        return np.asarray(off @ scales @ off)
+
+
+def tangent_basis(units: Floats) -> Floats:
+    """Return orthonormal bases of the planes across unit vectors, shape (n, 2, 3)."""
+    least = np.zeros_like(units)
+    least[np.arange(len(units)), np.abs(units).argmin(axis=1)] = 1.0
+    first = np.cross(units, least)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(units, first)], axis=1)
+
+
+def log_map(units: Floats, measured: Floats, plane: Floats) -> Floats:
+    """Return where unit vectors lie as seen from others, as tangent vectors [rad], shape (n, 2).
+
+    Args:
+        units: Where from, shape (n, 3).
+        measured: Where to, shape (n, 3).
+        plane: Tangent bases at `units`, shape (n, 2, 3).
+    """
+    flat = np.einsum("nij,nj->ni", plane, measured)
+    size = np.linalg.norm(flat, axis=1)
+    angle = np.arctan2(size, np.sum(units * measured, axis=1))
+    # Straight on it is the identity; at the antipode any direction will do.
+    factor = np.where(size > _TINY, angle / np.maximum(size, _TINY), 1.0)
+    flat = np.where((size <= _TINY)[:, None] & (angle > 1.0)[:, None], [1.0, 0.0], flat)
+    factor = np.where((size <= _TINY) & (angle > 1.0), np.pi, factor)
+    return np.asarray(flat * factor[:, None])
+
+
+def _loads(matrices: Floats, units: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return grad D, the loads of the terms, shape (k, n, 3), and the Hessian of D."""
+    products = np.einsum("kij,nj->kni", matrices, units)
+    speeds = np.sqrt(np.maximum(np.einsum("kni,ni->kn", products, units), _TINY**2))
+    parts = products / speeds[:, :, None]
+    hessian = np.einsum("kij,kn->nij", matrices, 1.0 / speeds)
+    hessian -= np.einsum("kni,knj->nij", parts / speeds[:, :, None], parts)
+    return parts.sum(axis=0), parts, hessian
+
+
+def _saturated(matrices: Floats, most: float) -> Floats:
+    """Return M inv(I + M / most^2) of symmetric 2x2 matrices, shape (n, 2, 2)."""
+    inner = np.eye(2) + matrices / most**2
+    return np.asarray(np.linalg.solve(inner, matrices))
