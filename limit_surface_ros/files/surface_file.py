@@ -19,12 +19,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from limit_surface_ros.checks import as_positive
-from limit_surface_ros.errors import RangeError
+from limit_surface_ros.errors import DataError, RangeError
 from limit_surface_ros.files.outline_section import outline_values, read_outline
 from limit_surface_ros.files.section import Section, place_errors
 from limit_surface_ros.files.yaml_reader import read_yaml, write_yaml
 from limit_surface_ros.surface.convexity import Convexity, is_convex, warn_unless_convex
 from limit_surface_ros.surface.kinds import KINDS
+from limit_surface_ros.surface.kinds.dissipation_scatter import UncertainSurface, scatter_of
 from limit_surface_ros.surface.scaling import Scaling
 
 if TYPE_CHECKING:
@@ -77,6 +78,20 @@ class SurfaceModel:
     def convexity(self) -> Convexity:
         """Whether the surface is convex: looked at once, when the model is read."""
         return is_convex(self.surface)
+
+    @cached_property
+    def uncertain(self) -> UncertainSurface | None:
+        """The surface with the scatter of its twists; None if its fit stored none.
+
+        Raises:
+            DataError: What stands under `fit: uncertainty` is not what fits write.
+        """
+        stored = self.fit.get("uncertainty")
+        if stored is None:
+            return None
+        if not isinstance(stored, Mapping):
+            raise DataError("fit: uncertainty is not what fits write: no mapping")
+        return UncertainSurface(self.surface, scatter_of(stored, self.surface))
 
 
 def _read_arrays(section: Section, arrays: Sequence[FileArray]) -> dict[str, Any]:

@@ -23,7 +23,7 @@ import numpy as np
 from limit_surface_ros.checks import counted
 from limit_surface_ros.errors import DataError, LimitSurfaceError, RangeError
 from limit_surface_ros.files.surface_file import read_surface_model
-from limit_surface_ros.fitting.few_pushes.uncertainty import surfaces_of, twist_spread
+from limit_surface_ros.fitting.few_pushes.bootstrap import surfaces_of, twist_spread
 from limit_surface_ros.fitting.pairs import scaling_of_pairs
 from limit_surface_ros.fitting.result import errors_on
 from limit_surface_ros.fitting.search import Search, process_pool

@@ -88,6 +88,8 @@ def report(fitted: FittedModel, output: Path) -> None:
     print_errors("training", result.training)
     if result.held_out is not None:
         print_errors("held out", result.held_out)
+    if fitted.sureness:
+        print(f"scatter     {fitted.sureness}")
     print(f"time        {result.wall_time:.2f} s")
     print(f"written     {output}")
 

@@ -14,7 +14,7 @@ import pytest
 
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.files.surface_file import read_surface_model
-from limit_surface_ros.fitting.few_pushes.uncertainty import surfaces_of
+from limit_surface_ros.fitting.few_pushes.bootstrap import surfaces_of
 from limit_surface_ros.fitting.result import Errors, FitResult
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.measures import mean_angle
@@ -130,7 +130,10 @@ def test_the_automatic_fit_stores_its_choice_and_its_bootstrap(pushes, tmp_path)
     arguments = [str(pushes), "-o", str(output), "--auto", "--bootstrap", "3", "--rows", "0-15"]
     assert main([*arguments, "--folds", "2"]) == 0
     model = read_surface_model(output)
-    assert len(model.fit["cross_validation_mean_angle_deg"]) >= 4
+    assert len(model.fit["cross_validation_mean_angle_deg"]) == 4
+    answer = model.uncertain.twist_with_covariance([1.0, 0.0, 0.01])
+    assert answer.covariance.shape == (3, 3)
+    assert 0.0 < answer.half_axes[1] <= answer.half_axes[0]
     assert len(surfaces_of(model.fit["bootstrap"], model.surface.scaling)) == 3
 
 

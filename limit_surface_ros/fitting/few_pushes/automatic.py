@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The fit that asks for no choice: a recipe by cross-validation, refitted on all pushes."""
+"""The fit that asks for no choice: a mixture of models, and how sure its twists are."""
 
 from __future__ import annotations
 
@@ -8,12 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limit_surface_ros.fitting.few_pushes.cross_validation import choose_recipe
-from limit_surface_ros.fitting.few_pushes.uncertainty import bootstrap, stored_surfaces
+from limit_surface_ros.fitting.few_pushes.bootstrap import bootstrap, stored_surfaces
+from limit_surface_ros.fitting.few_pushes.calibration import calibrated_scatter
+from limit_surface_ros.fitting.few_pushes.cross_validation import cross_validate
+from limit_surface_ros.fitting.few_pushes.mixture import choose_mixture, usual_mixture
+from limit_surface_ros.fitting.few_pushes.recipe import ROBUST_SCALE, VELOCITY_WEIGHT, FitContext
+from limit_surface_ros.fitting.motion_cost import MotionCost
+from limit_surface_ros.fitting.pairs import scale_pairs
 from limit_surface_ros.fitting.result import FitResult, errors_on
 from limit_surface_ros.fitting.search import Search
+from limit_surface_ros.surface.measures import angle_error
 
 if TYPE_CHECKING:
+    from limit_surface_ros.fitting.few_pushes.cross_validation import Fold
     from limit_surface_ros.fitting.search import Progress
     from limit_surface_ros.surface.kinds.point_contacts import PointContacts
     from limit_surface_ros.surface.pairs import Pairs
@@ -29,7 +36,10 @@ def fit_automatically(
     refits: int = 0,
     search: Search | None = None,
 ) -> FitResult:
-    """Choose a recipe by cross-validation, refit it on all pushes, and say what was chosen.
+    """Fit a mixture of dissipation models to recorded pushes, and how its twists scatter.
+
+    The result's details hold the mean angle of every part and of the mixture on held-out pushes,
+    and under "uncertainty" what `surface.kinds.dissipation_scatter.scatter_of` reads.
 
     Args:
         pairs: Recorded pushes.
@@ -42,11 +52,17 @@ def fit_automatically(
     Raises:
         DataError: The pushes cannot determine a surface.
         RangeError: There are fewer than two folds, or one refit.
+        SolverError: A part of the mixture does not pass through the loads.
     """
     search = search or Search()
     begin = time.perf_counter()
-    choice = choose_recipe(
+    usual = usual_mixture(support is not None)
+    recipes = [recipe for recipe, _ in usual]
+    scaled = scale_pairs(pairs, scaling)
+    scaling = scaled.scaling
+    held_out = cross_validate(
         pairs,
+        recipes,
         folds=folds,
         scaling=scaling,
         support=support,
@@ -54,38 +70,62 @@ def fit_automatically(
         executor=search.executor,
         progress=_from(search.progress, 0, folds + refits),
     )
-    descent = choice.descent
+    mixture = choose_mixture(held_out, usual)
+    surface, parts = mixture.fit(FitContext(pairs, scaling, support, seed=search.seed))
+    of_folds = [mixture.of_fold(fold, recipes) for fold in held_out]
+    scatter = calibrated_scatter(surface, of_folds, [fold.held_out for fold in held_out])
+    predicted = [
+        angle_error(of_fold, fold.held_out)
+        for of_fold, fold in zip(of_folds, held_out, strict=True)
+    ]
     details: dict[str, Any] = {
         "cross_validation_mean_angle_deg": {
-            str(recipe): round(float(np.degrees(angle)), 3)
-            for recipe, angle in zip(choice.candidates, choice.angles.mean(axis=1), strict=True)
-            if np.isfinite(angle)
+            str(recipe): _mean_angle(held_out, row)
+            for row, recipe in enumerate(recipes)
+            if all(fold.surfaces[row] is not None for fold in held_out)
         }
+        | {"mixture": _degrees(float(np.concatenate(predicted).mean()))},
+        "uncertainty": scatter.stored(),
     }
     if refits:
         surfaces = bootstrap(
             pairs,
-            choice.recipe,
+            mixture,
             refits,
-            scaling=choice.surface.scaling,
+            scaling=scaling,
             support=support,
             seed=search.seed,
             executor=search.executor,
             progress=_from(search.progress, folds, folds + refits),
         )
         details["bootstrap"] = stored_surfaces(surfaces)
+    cost, _ = MotionCost(scaled, VELOCITY_WEIGHT, ROBUST_SCALE).of(surface.matrices)
     return FitResult(
-        surface=choice.surface,
-        objective=str(choice.recipe),
-        cost=descent.cost,
-        start_costs=(descent.cost,),
-        iterations=descent.iterations,
-        gradient_norm=descent.gradient_norm,
-        converged=descent.converged,
+        surface=surface,
+        objective=str(mixture),
+        cost=cost,
+        start_costs=(cost,),
+        iterations=sum(part.iterations for part in parts),
+        gradient_norm=max(part.gradient_norm for part in parts),
+        converged=all(part.converged for part in parts),
         wall_time=time.perf_counter() - begin,
-        training=errors_on(choice.surface, pairs),
+        training=errors_on(surface, pairs),
         details=details,
     )
+
+
+def _mean_angle(folds: list[Fold], row: int) -> float:
+    """Return the mean angle [deg] of one recipe's fits on what the folds held out."""
+    angles = []
+    for fold in folds:
+        surface = fold.surfaces[row]
+        assert surface is not None
+        angles.append(angle_error(surface, fold.held_out))
+    return _degrees(float(np.concatenate(angles).mean()))
+
+
+def _degrees(angle: float) -> float:
+    return round(float(np.degrees(angle)), 3)
 
 
 def _from(progress: Progress | None, before: int, total: int) -> Progress | None:

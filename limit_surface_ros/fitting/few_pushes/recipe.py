@@ -53,7 +53,9 @@ Prior = Literal["none", "ellipsoid", "pressure", "support"]
 # Pushes fewer than an ellipsoid's parameters say nothing, whatever the prior.
 FEWEST_PAIRS = 6
 # Chord between unit motions beyond which its cost grows linearly.
-_ROBUST_SCALE = 0.2
+ROBUST_SCALE = 0.2
+# Weight of the motions against the loads.
+VELOCITY_WEIGHT = 2.0
 # Share of a term that keeps it smooth; see `factors`.
 _FLOOR = 1e-3
 # Terms that sum up known support points, where there are more of them: those of a patch are many.
@@ -88,7 +90,7 @@ class Recipe:
 
     kind: Literal["power_sum", "dissipation"] = "dissipation"
     terms: int = 3
-    velocity_weight: float = 2.0
+    velocity_weight: float = VELOCITY_WEIGHT
     prior: Prior = "none"
     prior_weight: float = 1.0
 
@@ -182,7 +184,7 @@ class FitContext:
         else:
             raise DataError("no support points are known that the prior could be made of")
         found = fit_pressure(
-            self.scaled, usual, _ENTROPY_WEIGHT[prior], velocity_weight, _ROBUST_SCALE
+            self.scaled, usual, _ENTROPY_WEIGHT[prior], velocity_weight, ROBUST_SCALE
         ).loaded()
         self._pressures[prior, velocity_weight] = found
         return found
@@ -193,14 +195,14 @@ class FitContext:
             contacts = self.pressure(recipe.prior, weight)
             contacts = contacts.merged(recipe.terms if recipe.prior == "pressure" else _MOST_KNOWN)
             matrices = contacts.matrices
-            free = DirectionObjective(pairs, len(matrices), weight, _ROBUST_SCALE, _FLOOR)
+            free = DirectionObjective(pairs, len(matrices), weight, ROBUST_SCALE, _FLOOR)
             centre = floored_parameters(matrices, _FLOOR)
             return RegularisedObjective(free, centre, recipe.prior_weight * len(matrices))
         if recipe.prior == "ellipsoid":
             pairs = pairs.joined(_ellipsoid_pairs(pairs, weight, recipe.prior_weight))
         if recipe.kind == "dissipation":
-            return DirectionObjective(pairs, recipe.terms, weight, _ROBUST_SCALE, _FLOOR)
-        return PowerSumObjective(pairs, np.full(recipe.terms, 0.5), weight, _ROBUST_SCALE)
+            return DirectionObjective(pairs, recipe.terms, weight, ROBUST_SCALE, _FLOOR)
+        return PowerSumObjective(pairs, np.full(recipe.terms, 0.5), weight, ROBUST_SCALE)
 
 
 def check_pushes(pairs: ScaledPairs, fewest: int) -> None:
@@ -243,7 +245,7 @@ def _ellipsoid(objective: Objective, pairs: ScaledPairs) -> Descent:
 
 def _ellipsoid_pairs(pairs: ScaledPairs, weight: float, prior_weight: float) -> ScaledPairs:
     """Return pairs spread over the ellipsoid that fits `pairs`, with `prior_weight` in all."""
-    objective = PowerSumObjective(pairs, np.array([0.5]), weight, _ROBUST_SCALE)
+    objective = PowerSumObjective(pairs, np.array([0.5]), weight, ROBUST_SCALE)
     surface = objective.surface(_ellipsoid(objective, pairs).parameters)
     spread = scale_pairs(random_loads(surface, _ELLIPSOID_PAIRS, 0), pairs.scaling)
     return spread.weighted(np.full(_ELLIPSOID_PAIRS, prior_weight / _ELLIPSOID_PAIRS))

@@ -18,12 +18,15 @@ from limit_surface_ros.files.surface_file import LARGEST_SCALE, SurfaceModel
 from limit_surface_ros.fitting.description import Description, describe_fit
 from limit_surface_ros.fitting.dissipation import FITTED_ON, fit_dissipation
 from limit_surface_ros.fitting.few_pushes.automatic import fit_automatically
+from limit_surface_ros.fitting.few_pushes.calibration import squared_residuals
 from limit_surface_ros.fitting.pairs import scaling_of_pairs
 from limit_surface_ros.fitting.polynomial import fit_polynomial
 from limit_surface_ros.fitting.power_sum import fit_power_sum
 from limit_surface_ros.fitting.result import FitResult, errors_on
 from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.second_approximation import fit_second_approximation
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.dissipation_scatter import region_quantile
 from limit_surface_ros.surface.kinds.power_sum import thesis_exponents
 from limit_surface_ros.surface.scaling import Scaling
 from limit_surface_ros.tools.common.bag_options import add_bag_options
@@ -95,11 +98,13 @@ class FittedModel:
         model: The model.
         result: How it was fitted.
         description: Its size, what its data cover, and what looks like a slip.
+        sureness: How far pushes scatter about its twists, in words; empty if that is not known.
     """
 
     model: SurfaceModel
     result: FitResult
     description: Description
+    sureness: str = ""
 
 
 def add_fit_options(parser: argparse.ArgumentParser) -> None:
@@ -286,9 +291,8 @@ def fit_model(
     )
     doubts = (*data.doubts, *description.doubts, *doubts_of_errors(result))
     described = replace(description, doubts=doubts)
-    return FittedModel(
-        replace(model, fit=provenance(options, data, result, described)), result, described
-    )
+    fitted = replace(model, fit=provenance(options, data, result, described))
+    return FittedModel(fitted, result, described, sureness_of(fitted, data))
 
 
 def read_input(path: Path, options: argparse.Namespace) -> TrainingData:
@@ -477,6 +481,21 @@ def support_of(options: argparse.Namespace, data: TrainingData) -> PointContacts
             '"support_loads_N": [load, ...]}'
         )
     return data.support if options.support else None
+
+
+def sureness_of(model: SurfaceModel, data: TrainingData) -> str:
+    """Return in words how far pushes scatter, and whether those that were held out do so."""
+    uncertain = model.uncertain
+    if uncertain is None or not isinstance(model.surface, Dissipation):
+        return ""
+    axes = np.degrees(uncertain.twist_with_covariance(data.training.wrenches).half_axes)
+    large, small = np.median(axes, axis=0)
+    text = f"9 of 10 pushes within {large:.0f} x {small:.0f} deg (median) of the prediction"
+    if data.held_out is None:
+        return text
+    squares = squared_residuals(uncertain.scatter, model.surface, data.held_out)
+    share = np.mean(squares <= region_quantile(0.9))
+    return f"{text}; of those held out {100.0 * share:.0f} %"
 
 
 def doubts_of_errors(result: FitResult) -> list[str]:

@@ -10,8 +10,8 @@ J = du / d(f/|f|) is the curvature of the surface there. M = J F J' is the scatt
 every term's friction varying by itself from push to push, F = sum_k g_k g_k' / |G|^2 with the
 loads g_k of the terms and G of them all; J is unbounded at edges and a finite scatter is not,
 hence m. P is the jackknife variance over the models that leave out a fold of the pushes each
-(Efron and Stein 1981, doi:10.1214/aos/1176345462): what the pushes did not tell. Both are evaluated in closed form
-for a dissipation model, J from the bordered Hessian of D.
+(Efron and Stein 1981, doi:10.1214/aos/1176345462): what the pushes did not tell. Both are
+evaluated in closed form for a dissipation model, J from the bordered Hessian of D.
 
 The constants were fitted once, to 32 recorded sets; g is fitted to the pushes of each model by
 `fitting.few_pushes.calibration`.
@@ -19,13 +19,14 @@ The constants were fitted once, to 32 recorded sets; g is fitted to the pushes o
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limit_surface_ros.checks import as_directions, as_floats
+from limit_surface_ros.checks import as_floats
 from limit_surface_ros.errors import DataError, RangeError
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 
@@ -43,10 +44,10 @@ VERSION = 1
 OWN, FRICTION, SATURATED = float(np.radians(3.2)), 0.218, 2.1
 JACKKNIFE, JACKKNIFE_SATURATED = 1.4, 0.5
 FREEDOM = 3.3
-# Nodes along each side of a face of the table, and loads that are looked up in it rather than
-# worked out.
+# Covariance of the t distribution in parts of its scale.
+_VARIANCE = FREEDOM / (FREEDOM - 2.0)
+# Nodes along each side of a face of the table.
 _NODES = 33
-_FEW = 8
 _TINY = 1e-12
 
 
@@ -214,8 +215,9 @@ class UncertainSurface:
     ) -> TwistWithCovariance:
         """Return twists with their covariances and the half-axes of a region.
 
-        A few loads are looked up in a table that the first call makes (some tenths of a second,
-        also by `prepare`); it is within 2 % of the spread but next to edges of the surface.
+        One load alone is looked up in a table that the first such call makes (some tenths of a
+        second; `prepare` makes it, too). It is within 2 % of the spread but next to edges of the
+        surface, many loads are worked out exactly.
 
         Args:
             wrench: Shape (..., 3), (fx, fy, tau_z) [N, N, N m].
@@ -226,25 +228,20 @@ class UncertainSurface:
             ZeroVectorError: A wrench is zero.
         """
         quantile = region_quantile(probability)
-        wrenches = as_directions("wrench", wrench)
-        twists = np.asarray(self.surface.twist_of_wrench(wrenches))
+        twists = np.asarray(self.surface.twist_of_wrench(wrench))
+        if twists.ndim == 1:
+            return self._looked_up(wrench, twists, quantile)
         unit = self.surface.scaling.twist_unit
-        rows = (twists / unit).reshape(-1, 3)
-        if len(rows) <= _FEW:
-            loads = (wrenches / self.surface.scaling.wrench_unit).reshape(-1, 3)
-            scales = self._looked_up(loads, rows)
-        else:
-            scales = self.scatter.scale(rows)
+        scales = self.scatter.scale((twists / unit).reshape(-1, 3))
         # One eigenvalue is 0: the others follow from the trace and that of the square.
         middle = 0.5 * np.trace(scales, axis1=1, axis2=2)
         squares = np.einsum("nij,nji->n", scales, scales)
         root = np.sqrt(np.maximum(0.5 * squares - middle**2, 0.0))
         values = np.stack([middle + root, np.maximum(middle - root, 0.0)], axis=1)
-        covariances = FREEDOM / (FREEDOM - 2.0) * scales * unit[:, None] * unit
         shape = twists.shape[:-1]
         return TwistWithCovariance(
             twist=twists,
-            covariance=covariances.reshape(*shape, 3, 3),
+            covariance=(_VARIANCE * scales * unit[:, None] * unit).reshape(*shape, 3, 3),
             half_axes=np.sqrt(quantile * values).reshape(*shape, 2),
         )
 
@@ -253,45 +250,61 @@ class UncertainSurface:
         _ = self._table
 
     @cached_property
-    def _table(self) -> Floats:
-        """S over directions of load: three faces of a cube, S(-f) = S(f), shape (3, n, n, 9)."""
+    def _table(self) -> list[list[list[list[float]]]]:
+        """S over directions of load, on three faces of a cube since S(-f) = S(f).
+
+        Indexed by face, the two smaller components in parts of the largest, and the six distinct
+        entries; of plain numbers, which one load at a time is quicker with.
+        """
         side = np.linspace(-1.0, 1.0, _NODES)
         x, y = np.meshgrid(side, side, indexing="ij")
         ones = np.ones_like(x)
-        faces = np.stack(
-            [
-                np.stack([ones, x, y], axis=-1),
-                np.stack([x, ones, y], axis=-1),
-                np.stack([x, y, ones], axis=-1),
-            ]
-        ).reshape(-1, 3)
+        axes = [(ones, x, y), (x, ones, y), (x, y, ones)]
+        faces = np.stack([np.stack(each, axis=-1) for each in axes]).reshape(-1, 3)
         scaling = self.surface.scaling
         twists = self.surface.twist_of_wrench(faces * scaling.wrench_unit) / scaling.twist_unit
-        return self.scatter.scale(np.asarray(twists)).reshape(3, _NODES, _NODES, 9)
+        entries = self.scatter.scale(np.asarray(twists))[:, _UPPER[0], _UPPER[1]]
+        table: list[list[list[list[float]]]] = entries.reshape(3, _NODES, _NODES, 6).tolist()
+        return table
 
-    def _looked_up(self, loads: Floats, units: Floats) -> Floats:
-        """Return S of a few scaled loads with their unit twists, shape (n, 3, 3)."""
-        table, scales = self._table, np.empty((len(loads), 3, 3))
+    def _looked_up(self, wrench: ArrayLike, twist: Floats, quantile: float) -> TwistWithCovariance:
+        """Return what is asked for of one load, in plain numbers."""
+        fx, fy, tau = np.asarray(wrench, dtype=np.float64).tolist()
+        length = self.surface.scaling.characteristic_length
+        tau /= length
+        ux, uy, uz = twist.tolist()
+        uz *= length
+        sizes = (abs(fx), abs(fy), abs(tau))
+        face = sizes.index(max(sizes))
+        along, first, second = ((fx, fy, tau), (fy, fx, tau), (tau, fx, fy))[face]
         half = 0.5 * (_NODES - 1)
-        for row, (fx, fy, tau) in enumerate(loads.tolist()):
-            sizes = (abs(fx), abs(fy), abs(tau))
-            face = sizes.index(max(sizes))
-            if face == 0:
-                along, first, second = fx, fy, tau
-            elif face == 1:
-                along, first, second = fy, fx, tau
-            else:
-                along, first, second = tau, fx, fy
-            x, y = half * (1.0 + first / along), half * (1.0 + second / along)
-            i, j = min(int(x), _NODES - 2), min(int(y), _NODES - 2)
-            x, y = x - i, y - j
-            weights = ((1.0 - x) * (1.0 - y), (1.0 - x) * y, x * (1.0 - y), x * y)
-            scales[row] = np.dot(weights, table[face, i : i + 2, j : j + 2].reshape(4, 9)).reshape(
-                3, 3
-            )
-        # Between nodes the twist is another one: the scatter is in its plane.
-        off = np.eye(3) - units[:, :, None] * units[:, None, :]
-        return np.asarray(off @ scales @ off)
+        x, y = half * (1.0 + first / along), half * (1.0 + second / along)
+        i, j = min(int(x), _NODES - 2), min(int(y), _NODES - 2)
+        x, y = x - i, y - j
+        low, high = self._table[face][i], self._table[face][i + 1]
+        w00, w01, w10, w11 = (1.0 - x) * (1.0 - y), (1.0 - x) * y, x * (1.0 - y), x * y
+        xx, xy, xz, yy, yz, zz = [
+            w00 * a + w01 * b + w10 * c + w11 * d
+            for a, b, c, d in zip(low[j], low[j + 1], high[j], high[j + 1], strict=True)
+        ]
+        # Between nodes the twist is another one: the scatter is in the plane across it.
+        sx, sy, sz = (
+            xx * ux + xy * uy + xz * uz,
+            xy * ux + yy * uy + yz * uz,
+            xz * ux + yz * uy + zz * uz,
+        )
+        own = sx * ux + sy * uy + sz * uz
+        sx, sy, sz = sx - 0.5 * own * ux, sy - 0.5 * own * uy, sz - 0.5 * own * uz
+        xx, yy, zz = xx - 2.0 * sx * ux, yy - 2.0 * sy * uy, zz - 2.0 * sz * uz
+        xy, xz, yz = xy - sx * uy - sy * ux, xz - sx * uz - sz * ux, yz - sy * uz - sz * uy
+        middle = 0.5 * (xx + yy + zz)
+        squares = xx * xx + yy * yy + zz * zz + 2.0 * (xy * xy + xz * xz + yz * yz)
+        root = math.sqrt(max(0.5 * squares - middle * middle, 0.0))
+        axes = [math.sqrt(quantile * max(each, 0.0)) for each in (middle + root, middle - root)]
+        v, turn = _VARIANCE, _VARIANCE / length
+        xz, yz, zz = turn * xz, turn * yz, turn * zz / length
+        rows = [[v * xx, v * xy, xz], [v * xy, v * yy, yz], [xz, yz, zz]]
+        return TwistWithCovariance(twist, np.array(rows), np.array(axes))
 
 
 def tangent_basis(units: Floats) -> Floats:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far recorded pushes leave a predicted twist open: refits with random weights of the pushes.
+"""The Bayesian bootstrap of a fit: refits with random weights of the pushes.
 
 The Bayesian bootstrap (Rubin 1981, doi:10.1214/aos/1176345338) draws each push's weight from an
-exponential distribution. The surfaces of many such refits spread as the data allow.
+exponential distribution. The surfaces of many such refits spread as the data allow; that is less
+than real pushes scatter (see `dissipation_scatter`): 13 % of them lay within that of 25 refits.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.fitting.few_pushes.recipe import Recipe
+    from limit_surface_ros.fitting.few_pushes.mixture import Mixture
     from limit_surface_ros.fitting.search import Progress
     from limit_surface_ros.surface.base import LimitSurface
     from limit_surface_ros.surface.kinds.point_contacts import PointContacts
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 
 def bootstrap(
     pairs: Pairs,
-    recipe: Recipe,
+    mixture: Mixture,
     count: int,
     *,
     scaling: Scaling | None = None,
@@ -41,11 +42,11 @@ def bootstrap(
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> tuple[LimitSurface, ...]:
-    """Return the surfaces of `count` refits by one recipe.
+    """Return the surfaces of `count` refits of one mixture.
 
     Args:
         pairs: Recorded pushes.
-        recipe: How to fit.
+        mixture: How to fit.
         count: How many refits, at least 2.
         scaling: Characteristic length and friction force; chosen from the pairs if not given.
         support: Known support points, for recipes whose prior they are.
@@ -62,7 +63,7 @@ def bootstrap(
         raise RangeError(f"a bootstrap needs at least 2 refits, got {count}")
     weights = np.random.default_rng([seed, count]).exponential(size=(count, len(pairs)))
     weights /= weights.mean(axis=1, keepdims=True)
-    tasks = [(FitContext(pairs, scaling, support, each, seed), recipe) for each in weights]
+    tasks = [(FitContext(pairs, scaling, support, each, seed), mixture) for each in weights]
     if executor is None:
         found = (_refit(*task) for task in tasks)
     else:
@@ -75,13 +76,13 @@ def bootstrap(
         if progress is not None:
             progress(done, count)
     if len(surfaces) < 2:
-        raise SolverError(f"no refits by {recipe} pass through the loads")
+        raise SolverError(f"no refits of the {mixture} pass through the loads")
     return surfaces
 
 
-def _refit(context: FitContext, recipe: Recipe) -> LimitSurface | None:
+def _refit(context: FitContext, mixture: Mixture) -> LimitSurface | None:
     try:
-        return context.fit(recipe)[0]
+        return mixture.fit(context)[0]
     except SolverError:
         # Weights under which the fit is lost: the others show the spread.
         return None
