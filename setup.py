@@ -32,6 +32,7 @@ PROGRAMS: dict[str, str] = {
     "plot_push": "limit_surface_ros.tools.plot_push",
     "plot_slide": "limit_surface_ros.tools.plot_slide",
     "plot_surface": "limit_surface_ros.tools.plot_surface",
+    "replay_learning": "limit_surface_ros.tools.replay_learning",
     "reproduce_thesis": "limit_surface_ros.tools.reproduce_thesis",
     "ask": "limit_surface_ros.nodes.ask",
     "demo": "limit_surface_ros.nodes.demo",

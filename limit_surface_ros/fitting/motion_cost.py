@@ -177,6 +177,22 @@ class SmoothSupportSolver:
         u2 = (h12 * p1 - h11 * p2) / determinant
         return np.asarray(u1 * self.frame[1] + u2 * self.frame[2])
 
+    def response(self, changes: Floats) -> Floats:
+        """Return how the motions change with changes of grad D at them.
+
+        Args:
+            changes: Shape (k, 3, n), k changes at every load.
+
+        Returns:
+            Shape (k, 3, n): -(z1 z2) H^-1 (z1 . change, z2 . change)'.
+        """
+        p1 = np.einsum("kcn,cn->kn", changes, self.frame[1])
+        p2 = np.einsum("kcn,cn->kn", changes, self.frame[2])
+        h11, h12, h22 = self._hessian
+        determinant = h11 * h22 - h12 * h12
+        y1, y2 = (h12 * p2 - h22 * p1) / determinant, (h12 * p1 - h11 * p2) / determinant
+        return np.asarray(y1[:, None] * self.frame[1] + y2[:, None] * self.frame[2])
+
 
 def _descend(forms: Floats, places: Floats) -> None:
     """Move `places`, shape (2, n), to the minima; loads that have arrived are left out."""

@@ -24,6 +24,8 @@ from limit_surface_ros.fitting.bfgs import minimise
 from limit_surface_ros.fitting.motion_cost import MotionCost
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.fitting.pairs import ScaledPairs
     from limit_surface_ros.surface.kinds.point_contacts import PointContacts
@@ -74,11 +76,26 @@ class SmallContacts:
         centre = np.linalg.lstsq(arms * roots[:, None], moments * roots, rcond=None)[0]
         lever = np.sqrt((weights @ (moments - arms @ centre) ** 2) / (weights @ (arms**2)).sum())
         radius = max(_REACH * float(lever), _RINGS * _SMALLEST)
-        points = centre + radius * _rings()
+        points = centre + radius * _rings(_RINGS)
         spacing = radius / _RINGS
         count = len(points)
         even = cls(points, np.ones(count), np.full(count, _OVERLAP * spacing))
         return even.with_loads_of(pairs)
+
+    @classmethod
+    def around(cls, discs: Sequence[tuple[float, int]]) -> SmallContacts:
+        """Return contacts of unit limits on discs about the reference point.
+
+        Args:
+            discs: Radius, in characteristic lengths, and number of rings of each.
+        """
+        points = [radius * _rings(rings) for radius, rings in discs]
+        radii = [
+            np.full(len(each), _OVERLAP * radius / rings)
+            for each, (radius, rings) in zip(points, discs, strict=True)
+        ]
+        whole = np.concatenate(points)
+        return cls(whole, np.ones(len(whole)), np.concatenate(radii))
 
     @classmethod
     def at(cls, support: PointContacts, pairs: ScaledPairs) -> SmallContacts:
@@ -148,12 +165,12 @@ class SmallContacts:
         return SmallContacts(points[kept], limits[kept], radii[kept])
 
 
-def _rings() -> Floats:
-    """Return a centre and rings of 6, 12, 18 ... points around it in the unit disc."""
+def _rings(count: int) -> Floats:
+    """Return a centre and so many rings of 6, 12, 18 ... points around it in the unit disc."""
     points = [np.zeros((1, 2))]
-    for ring in range(1, _RINGS + 1):
+    for ring in range(1, count + 1):
         angles = 2.0 * np.pi * (np.arange(6 * ring) + 0.5 * (ring % 2)) / (6 * ring)
-        points.append(ring / _RINGS * np.stack([np.cos(angles), np.sin(angles)], axis=1))
+        points.append(ring / count * np.stack([np.cos(angles), np.sin(angles)], axis=1))
     return np.concatenate(points)
 
 
