@@ -17,6 +17,11 @@ from process_helpers import WAIT
 STAMP = Time(sec=7, nanosec=8)
 
 
+def stamp_message(nanosec):
+    """Return a stamp of so many nanoseconds."""
+    return Time(sec=1, nanosec=nanosec)
+
+
 def wrench_message(wrench, frame="object", stamp=STAMP):
     """Return a stamped planar wrench (fx, fy, tau_z)."""
     message = WrenchStamped()

@@ -41,7 +41,7 @@ class Batches:
         self._running = False
         self._queue: collections.deque[Waiting] = collections.deque()
         self._bytes = 0
-        endpoints.when_ending.append(self._refuse_all)
+        endpoints.when_ending.append(self._refuse_next)
 
     async def run(self, rows: int, work: Callable[[slice], None]) -> None:
         """Do work on all rows, in slices of them.
@@ -71,7 +71,7 @@ class Batches:
                     await self._endpoints.give_way()
         finally:
             self._running = bool(self._queue)
-            if self._queue:
+            if self._queue and not self._endpoints.ending:
                 self._queue.popleft().settle()
 
     async def _wait_for_turn(self, size: int) -> None:
@@ -90,8 +90,8 @@ class Batches:
         finally:
             self._bytes -= size
 
-    def _refuse_all(self, error: Exception) -> None:
-        while self._queue:
+    def _refuse_next(self, error: Exception) -> None:
+        if self._queue:
             self._queue.popleft().settle(error)
 
 

@@ -119,7 +119,9 @@ class Endpoints:
 
     Attributes:
         under_way: Requests that have begun and are not answered yet.
-        when_ending: Called with an error for what waits when the node ends.
+        ending: Whether the node is about to end.
+        when_ending: Called again and again with an error when the node ends, each time to refuse
+            one of the requests that wait.
         last_request: Steady time at which a request came or was answered last [s].
 
     Args:
@@ -133,7 +135,7 @@ class Endpoints:
         self._node = node
         self._health = health
         self._peers = peers
-        self._ending = False
+        self.ending = False
         self._waiting: dict[str, collections.deque[Waiting]] = {}
         self.when_ending: list[Callable[[Exception], None]] = []
         self.under_way = 0
@@ -194,8 +196,8 @@ class Endpoints:
                 send(answered, header)
 
             self.under_way += 1
-            if self._ending:
-                ended(UnavailableError("the node is ending"))
+            if self.ending:
+                ended(_ending_error())
             else:
                 _Handling(self, handler, call, ended).begin()
 
@@ -284,14 +286,19 @@ class Endpoints:
         await turn
 
     def end(self) -> None:
-        """Refuse what waits and what comes from now on; answers that have begun are finished."""
-        self._ending = True
-        error = UnavailableError("the node is ending")
+        """Refuse what comes from now on; answers that have begun are finished."""
+        self.ending = True
         for queue in self._waiting.values():
             for waiting in list(queue):
-                waiting.settle(error)
-        for refuse_all in self.when_ending:
-            refuse_all(error)
+                waiting.settle(_ending_error())
+
+    def refuse_next(self) -> None:
+        """Refuse one of the requests that wait, of a node that ends.
+
+        All at once would push each other out of the queue of a client that made them all.
+        """
+        for refuse in self.when_ending:
+            refuse(_ending_error())
 
     def refuse(self, name: str, error: Exception) -> str:
         """Count and log an error; return the sentence for who asked."""
@@ -325,6 +332,10 @@ class Endpoints:
     def count_time(self, seconds: float) -> None:
         """Count a stretch of time [s] in which nobody else had a turn."""
         self._health.times.add(seconds)
+
+
+def _ending_error() -> UnavailableError:
+    return UnavailableError("the node is ending")
 
 
 class _Handling:

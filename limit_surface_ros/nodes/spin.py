@@ -50,8 +50,8 @@ _ADDRESSED = (
 # What names the folder of the log, for rcl.
 _HOMES = ("ROS_LOG_DIR", "ROS_HOME", "HOME")
 # Requests may be on their way: so long after the last one [s], and no longer in all, a node that
-# ends refuses what comes.
-QUIET, LONGEST_END = 0.2, 5.0
+# ends refuses what comes, and one of those that wait at a time.
+QUIET, LONGEST_END, PACE = 0.2, 5.0, 0.02
 # Threads that prepare models give way to the node this often [s].
 SWITCH_INTERVAL = 5e-4
 # The middleware is still sending a large answer when the call is over; it is lost if the node is
@@ -173,12 +173,16 @@ def _answer_what_waits(executor: Executor, endpoints: Sequence[Endpoints]) -> No
     """Finish answers that have begun, and refuse what has come or still comes."""
     for each in endpoints:
         each.end()
-    start = time.monotonic()
+    start = refused = time.monotonic()
     while (now := time.monotonic()) - start < LONGEST_END:
+        if now - refused > PACE:
+            refused = now
+            for each in endpoints:
+                each.refuse_next()
         last = max(start, *(each.last_request for each in endpoints))
         if now - last > QUIET and not any(each.under_way for each in endpoints):
             break
-        _spin_guarded(executor, 0.05)
+        _spin_guarded(executor, PACE)
 
 
 def _spin_until_woken(executor: Executor, woken: socket.socket, wakes: socket.socket) -> None:

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""However a node is told to end, all that waits is answered or refused; nothing else ends it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
+
+from limit_surface_interfaces.msg import ErrorCode
+from limit_surface_interfaces.srv import WrenchesToTwists, WrenchToTwist
+from rclpy.qos import QoSProfile
+
+from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
+from limit_surface_ros.nodes import convert
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
+from limit_surface_ros.surface.scaling import Scaling
+from node_helpers import Program, wrench_message
+
+BATCHES = 20
+
+
+@pytest.mark.parametrize("executor", ["single_threaded", "events"])
+def test_twenty_batches_that_wait_at_a_signal_all_get_an_answer(
+    ros, client_node, tmp_path, executor
+):
+    factors = np.random.default_rng(0).normal(size=(24, 3, 2))
+    surface = Dissipation(factors @ factors.transpose(0, 2, 1), Scaling(0.05, 2.0))
+    path = tmp_path / "slow.yaml"
+    write_surface_model(SurfaceModel(name="slow", surface=surface), path)
+    options = "-p", f"model_files:=['{path}']", "-p", f"executor:={executor}"
+    with Program("limit_surface_node", "--ros-args", *options) as program:
+        client = client_node.create_client(
+            WrenchesToTwists,
+            "/limit_surface/wrenches_to_twists",
+            qos_profile=QoSProfile(depth=2 * BATCHES),
+        )
+        assert client.wait_for_service(timeout_sec=20.0)
+        one = ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
+        # A server drops answers to a client that it has yet to discover.
+        while not ros.done(client.call_async(WrenchesToTwists.Request()), 2.0):
+            pass
+        wrenches = np.random.default_rng(1).normal(size=(20_000, 3))
+        asked = WrenchesToTwists.Request(wrenches=convert.flat_of(wrenches))
+        waiting = [client.call_async(asked) for _ in range(BATCHES)]
+        # What is asked after them is answered while they wait: they have all come.
+        assert one(WrenchToTwist.Request(wrench=wrench_message([9, 0, 0]))).error_code == 0
+        code, output = program.end(signal.SIGINT)
+    assert code == 0, output
+    for future in waiting:
+        assert ros.done(future, 20.0)
+    codes = [future.result().error_code for future in waiting]
+    assert set(codes) <= {ErrorCode.NONE, ErrorCode.UNAVAILABLE}
+    assert ErrorCode.UNAVAILABLE in codes
+    assert "Traceback" not in output
+
+
+def test_a_terminal_that_is_closed_ends_the_node_as_sigterm_does(ros, client_node, model_file):
+    options = "-p", f"model_files:=['{model_file()[1]}']"
+    with Program("limit_surface_node", "--ros-args", *options) as program:
+        ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
+        code, output = program.end(signal.SIGHUP)
+    assert code == 0, output
+    assert "Traceback" not in output
+
+
+def test_under_nohup_a_node_outlives_its_terminal(ros, client_node, model_file):
+    options = "-p", f"model_files:=['{model_file()[1]}']"
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        program = Program("limit_surface_node", "--ros-args", *options)
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    with program:
+        call = ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
+        program.process.send_signal(signal.SIGHUP)
+        asked = WrenchToTwist.Request(wrench=wrench_message([9, 0, 0]))
+        assert call(asked).error_code == ErrorCode.NONE
+        code, output = program.end()
+    assert code == 0, output
+
+
+def test_a_node_without_standard_streams_serves(ros, client_node, model_file):
+    module = "limit_surface_ros.nodes.limit_surface_node"
+    command = f'exec {sys.executable} -m {module} --ros-args -p "$1" >&- 2>&- <&-'
+    process = subprocess.Popen(
+        ["/bin/sh", "-c", command, "sh", f"model_files:=['{model_file()[1]}']"],
+        env=os.environ | {"PYTHONUNBUFFERED": "1"},
+    )
+    try:
+        call = ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
+        asked = WrenchToTwist.Request(wrench=wrench_message([9, 0, 0]))
+        assert call(asked).error_code == ErrorCode.NONE
+        # What it would have logged.
+        asked.model = "none"
+        assert call(asked).error_code == ErrorCode.UNKNOWN_MODEL
+        asked.model = ""
+        assert call(asked).error_code == ErrorCode.NONE
+        assert process.poll() is None
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(timeout=20.0) == 0
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.wait()
