@@ -61,8 +61,10 @@ class Waiting:
         if self.settled:
             return
         self.settled, self.refused_by = True, refused_by
-        if self.resume is not None:
-            self.resume()
+        # Let go of it: requests and answers of megabytes hang on it, in a circle.
+        resume, self.resume = self.resume, None
+        if resume is not None:
+            resume()
 
     def __await__(self) -> Iterator[Waiting]:
         """Suspend the coroutine until this is settled."""
@@ -401,4 +403,5 @@ class _Handling:
 
     def _end(self, start: float, error: Exception | None) -> None:
         self._endpoints.count_time(time.perf_counter() - start)
+        self._running, self._arguments = None, ()
         self._ended(error)

@@ -250,7 +250,7 @@ def test_a_signal_during_a_call_ends_the_node_cleanly_after_its_answer(
     surface = Dissipation(factors @ factors.transpose(0, 2, 1), Scaling(0.05, 2.0))
     path = tmp_path / "slow.yaml"
     write_surface_model(SurfaceModel(name="slow", surface=surface), path)
-    wrenches = np.random.default_rng(1).normal(size=(5_000, 3))
+    wrenches = np.random.default_rng(1).normal(size=(60_000, 3))
     options = "-p", f"model_files:=['{path}']", "-p", f"executor:={executor}"
     with Program("limit_surface_node", "--ros-args", *options) as program:
         name = "/limit_surface/wrenches_to_twists"
