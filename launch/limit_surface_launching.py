@@ -29,6 +29,8 @@ TOPICS = {
         "predicted_twist_topic": "~/predicted_twist",
         "required_wrench_topic": "~/required_wrench",
         "surface_topic": "~/surface",
+        "push_topic": "~/push",
+        "push_path_topic": "~/push_path",
     },
     "decay": {
         "onset_topic": "~/onset",
@@ -36,6 +38,7 @@ TOPICS = {
         "falling_wrench_topic": "~/wrench",
         "value_topic": "~/value",
         "forecast_topic": "~/forecast",
+        "time_left_topic": "~/time_left",
     },
 }
 SHARED_TOPICS = {"tf_topic": "/tf", "tf_static_topic": "/tf_static"}

@@ -328,14 +328,14 @@ def prepare_surface(model: SurfaceModel) -> None:
 
 def wrench_at_origin(model: SurfaceModel, wrench: Sequence[float]) -> tuple[float, ...]:
     """Return a wrench about the reference point as it is at the origin of the model's frame."""
-    fx, fy, tau = wrench
+    fx, fy, tau = map(float, wrench)
     x, y = model.reference_point
     return fx, fy, tau + x * fy - y * fx
 
 
 def twist_at_origin(model: SurfaceModel, twist: Sequence[float]) -> tuple[float, ...]:
     """Return a twist at the reference point as it is at the origin of the model's frame."""
-    vx, vy, omega = twist
+    vx, vy, omega = map(float, twist)
     x, y = model.reference_point
     return vx + omega * y, vy - omega * x, omega
 

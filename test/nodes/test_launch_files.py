@@ -14,6 +14,12 @@ from xml.etree import ElementTree
 import pytest
 import yaml
 
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
+
+from limit_surface_ros.nodes.decay_node import DecayNode
+from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
+
 ROOT = Path(__file__).resolve().parents[2]
 XML_FILES = sorted((ROOT / "launch").glob("*.xml"))
 PROGRAMS = set(re.findall(r'"(\w+)": "limit_surface_ros\.', (ROOT / "setup.py").read_text()))
@@ -28,6 +34,57 @@ def test_xml_declares_each_argument_that_it_uses_and_starts_a_program_that_exist
     assert {node.get("exec") for node in root.iter("node")} <= PROGRAMS
     for config in re.findall(r"limit_surface_ros\)/(config/\w+\.yaml)", path.read_text()):
         assert yaml.safe_load((ROOT / config).read_text())
+
+
+def tables():
+    """Return the constants of the module that the launch files share, without `launch`."""
+    tree = ast.parse((ROOT / "launch" / "limit_surface_launching.py").read_text())
+    found = {}
+    for node in tree.body:
+        if isinstance(node, ast.Assign):
+            found[node.targets[0].id] = ast.literal_eval(node.value)
+    return found
+
+
+@pytest.mark.parametrize("path", XML_FILES, ids=lambda path: path.name)
+def test_the_xml_file_declares_the_arguments_of_the_python_file_and_hands_all_of_them_on(path):
+    root = ElementTree.parse(path).getroot()
+    (include,) = root.iter("include")
+    assert include.get("file").endswith(f"/launch/{path.with_suffix('.py').name}")
+    handed_on = {argument.get("name"): argument.get("value") for argument in include}
+    declared = {argument.get("name"): argument for argument in root.findall("arg")}
+    assert handed_on == {name: f"$(var {name})" for name in declared}
+    tree = ast.parse(path.with_suffix(".py").read_text())
+    (call,) = (
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "description"
+    )
+    program, nodes, lists = (ast.literal_eval(argument) for argument in call.args)
+    assert program in PROGRAMS
+    shared = tables()
+    topics = {**shared["SHARED_TOPICS"]}
+    for node in nodes:
+        topics |= shared["TOPICS"][node]
+    assert set(declared) == {*shared["COMMON"], *lists, *topics}
+    for name, topic in topics.items():
+        assert declared[name].get("default") == topic
+
+
+@pytest.mark.parametrize("name", ["limit_surface", "decay"])
+def test_every_topic_of_a_node_has_an_argument(ros, name):
+    node = ros.add({"limit_surface": LimitSurfaceNode, "decay": DecayNode}[name])
+    own = node.get_name(), node.get_namespace()
+    found = [
+        topic.replace(f"/{name}/", "~/")
+        for topics in (
+            node.get_publisher_names_and_types_by_node(*own),
+            node.get_subscriber_names_and_types_by_node(*own),
+        )
+        for topic, _ in topics
+        if topic.startswith(f"/{name}/")
+    ]
+    assert set(tables()["TOPICS"][name].values()) == set(found)
 
 
 @pytest.mark.parametrize("path", XML_FILES, ids=lambda path: path.name)
