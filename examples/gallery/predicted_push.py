@@ -3,9 +3,9 @@
 
     scripts/with_ros --with extras -- python3 examples/gallery/predicted_push.py push.png
 
-The body is an L on an even patch. Twenty-five pushes of it are simulated, with noise as in
-recordings; an ellipsoid and the automatic fit learn from them. A pusher then takes a path that
-none of them knew, and the exact patch says where the body really ends.
+The body is an L on an even patch. An ellipsoid and six dissipations, what `fit_surface` makes of a
+patch, are fitted to it. A pusher takes a path, and the exact patch says where the body ends. The
+program also prints how far both are off in the mean of sixty random pushes.
 """
 
 from __future__ import annotations
@@ -15,13 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from limit_surface_ros.fitting.few_pushes.automatic import fit_automatically
+from limit_surface_ros.fitting.dissipation import fit_dissipation
 from limit_surface_ros.fitting.power_sum import fit_power_sum
 from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.motion.outline import Polygon
-from limit_surface_ros.motion.rollout import simulate_push
+from limit_surface_ros.motion.rollout import simulate_push, simulate_pushes
 from limit_surface_ros.plots.canvas import BLACK, BLUE, GREY, VERMILION, new_figure, save_figure
-from limit_surface_ros.surface import Pairs
 from limit_surface_ros.surface.contact import shapes
 from limit_surface_ros.surface.contact.patch import ContactPatch
 from limit_surface_ros.surface.sampling import random_motions
@@ -29,22 +28,10 @@ from limit_surface_ros.surface.sampling import random_motions
 # An L of 0.12 m by 0.09 m, about the middle of its bounding box [m].
 CORNERS = np.array([[0, 0], [0.12, 0], [0.12, 0.03], [0.03, 0.03], [0.03, 0.09], [0, 0.09]])
 CORNERS -= [0.045, 0.03]
-PUSHES, NOISE = 25, np.radians(6.0)
+MOTIONS = 1000
 PATH = np.array([[-0.10, -0.012], [0.05, -0.01], [0.14, 0.02]])
 TIP, FRICTION = 0.006, 0.3
 PLACES = (0.0, 0.35, 0.7, 1.0)
-
-
-def recorded(body, seed):
-    """Return pushes of a body whose motions scatter as recorded ones do."""
-    pairs = random_motions(body, PUSHES, seed)
-    rng = np.random.default_rng(seed)
-    unit = body.scaling.twist_unit
-    twists = pairs.twists / unit
-    twists /= np.linalg.norm(twists, axis=1, keepdims=True)
-    twists += NOISE / np.sqrt(2.0) * rng.normal(size=twists.shape)
-    wrenches = pairs.wrenches * (1.0 + 0.05 * rng.normal(size=(PUSHES, 1)))
-    return Pairs(wrenches, twists * unit)
 
 
 def placed(outline, pose):
@@ -54,18 +41,35 @@ def placed(outline, pose):
     return 1e3 * (corners @ [[c, s], [-s, c]] + pose[:2])
 
 
+def mean_errors(body, models, outline):
+    """Print how far models are off over random pushes of 0.2 m past the body's middle."""
+    rng = np.random.default_rng(0)
+    angles = rng.uniform(0.0, 2.0 * np.pi, 60)
+    along = np.column_stack([np.cos(angles), np.sin(angles)])
+    across = np.column_stack([-along[:, 1], along[:, 0]])
+    begin, end = rng.uniform(-0.04, 0.04, (2, 60, 1))
+    paths = np.stack([-0.12 * along + begin * across, 0.08 * along + end * across], axis=1)
+    poses = np.zeros((60, 3))
+    truth = simulate_pushes(body, outline, TIP, FRICTION, poses, paths).end_poses
+    touched = truth.any(axis=1)
+    for name, surface in models.items():
+        off = simulate_pushes(surface, outline, TIP, FRICTION, poses, paths).end_poses - truth
+        away = 1e3 * np.hypot(*off[touched, :2].T).mean()
+        turned = np.degrees(np.abs(off[touched, 2])).mean()
+        print(f"{name}: {away:.2f} mm, {turned:.2f} deg off in {touched.sum()} random pushes")
+
+
 def main(path):
     """Fit, push, draw."""
     body = ContactPatch.of_shape(shapes.polygon(CORNERS, count=800)).surface(0.35, 10.0)
-    pairs = recorded(body, 3)
+    pairs = random_motions(body, MOTIONS, 3)
     search = Search(starts=4, seed=1)
     models = {
-        "ellipsoid": fit_power_sum(
-            pairs, exponents=[1.0], scaling=body.scaling, search=search
-        ).surface,
-        "fit_surface --auto": fit_automatically(pairs, scaling=body.scaling).surface,
+        "ellipsoid": fit_power_sum(pairs, [1.0], scaling=body.scaling, search=search).surface,
+        "six dissipations": fit_dissipation(pairs, 6, scaling=body.scaling, search=search).surface,
     }
     outline = Polygon(CORNERS)
+    mean_errors(body, models, outline)
     start = [0.0, 0.0, 0.0]
     truth = simulate_push(body, outline, TIP, FRICTION, start, PATH)
     lengths = np.array(PLACES) * truth.path_lengths[-1]
@@ -80,7 +84,7 @@ def main(path):
                 linewidth=1.6 if last else 0.9,
                 label="where it ends" if last else None,
             )
-        lines = {"ellipsoid": (VERMILION, "--"), "fit_surface --auto": (BLUE, "-")}
+        lines = {"ellipsoid": (VERMILION, "--"), "six dissipations": (BLUE, "-")}
         for name, surface in models.items():
             run = simulate_push(surface, outline, TIP, FRICTION, start, PATH)
             away = 1e3 * np.hypot(*(run.end_pose - truth.end_pose)[:2])
@@ -98,7 +102,7 @@ def main(path):
         axes.set_xlabel("x [mm]")
         axes.set_ylabel("y [mm]")
         axes.legend(loc="upper left", frameon=False)
-        axes.set_title(f"A push that no model knew, after {PUSHES} noisy pushes", loc="left")
+        axes.set_title("A push, and where two models of the contact say that it ends", loc="left")
     save_figure(figure, path, 150)
 
 

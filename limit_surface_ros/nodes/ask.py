@@ -43,7 +43,7 @@ PATHS = {
     "torque": ("wrench.wrench.torque.z", "wrench.torque.z"),
     "velocity": ("twist.twist.linear", "twist.linear", "velocity"),
     "turning": ("twist.twist.angular.z", "twist.angular.z"),
-    "at": ("contact.point",),
+    "at": ("contact",),
     "normal": ("normal",),
     "friction": ("friction",),
     "model": ("model",),
