@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from limit_surface_ros.errors import SolverError
 from limit_surface_ros.motion.outcomes import ContactMode, Push
-from limit_surface_ros.motion.outline import Polygon
 from limit_surface_ros.motion.push import push
 from limit_surface_ros.motion.several_contacts import TwoContacts
 
@@ -47,30 +45,23 @@ def push_in_corner(scene: Scene, centre: complex, heading: complex, radius: floa
         centre: Of the tip, in the body's frame [m].
         heading: Its unit velocity, in the body's frame.
         radius: Distance at which it touches [m].
-
-    Raises:
-        SolverError: No motion was found.
     """
-    assert isinstance(scene.outline, Polygon)
     about = np.array([scene.reference_point.real, scene.reference_point.imag])
     ahead = np.array([heading.real, heading.imag])
     at = np.array([centre.real, centre.imag])
     slack = 2.0 * TWO_PLACES * scene.tolerance
-    touched = [
-        (foot - about, -normal)
-        for foot, normal in scene.outline.touched(at, radius, slack)
-        if normal @ ahead < 0.0
-    ]
-    if len(touched) < 2:
-        near = scene.outline.nearest(at[np.newaxis])
-        edge = scene.edge
-        friction = edge.imag / edge.real if edge.real > 0.0 else np.inf
-        return push(scene.surface, near.points[0] - about, -near.normals[0], friction, ahead)
-    points, normals = (np.array([each[i] for each in touched[:2]]) for i in (0, 1))
-    edges, twist = np.full(2, scene.edge), np.append(ahead, 0.0)
-    answer = next(TwoContacts(scene.surface, points, normals, edges, twist).answers(), None)
-    if answer is None:
-        raise SolverError("no motion was found of a body that is touched in an inward corner")
-    first, second = answer.modes
-    mode = second if first is ContactMode.SEPARATE else first
-    return Push(answer.twist, mode, answer.wrench)
+    touched = scene.outline.touched(at, radius, slack)
+    if len(touched) >= 2:
+        feet, outward = (np.array([each[i] for each in touched[:2]]) for i in (0, 1))
+        edges, twist = np.full(2, scene.edge), np.append(ahead, 0.0)
+        answers = TwoContacts(scene.surface, feet - about, -outward, edges, twist).answers()
+        answer = next(answers, None)
+        if answer is not None:
+            first, second = answer.modes
+            mode = second if first is ContactMode.SEPARATE else first
+            return Push(answer.twist, mode, answer.wrench)
+    # One place, or two so near to each other that what one does is as good.
+    near = scene.outline.nearest(at[np.newaxis])
+    edge = scene.edge
+    friction = edge.imag / edge.real if edge.real > 0.0 else np.inf
+    return push(scene.surface, near.points[0] - about, -near.normals[0], friction, ahead)

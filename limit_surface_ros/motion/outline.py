@@ -72,6 +72,22 @@ class Outline(ABC):
         """
 
     @abstractmethod
+    def touch_counts(self, points: Floats, distances: Floats, slack: float) -> Places:
+        """Return at how many places of the outline points lie at given distances, shape (m,).
+
+        A tip in an inward corner, or in a hollow in which it does not fit, touches two.
+
+        Args:
+            points: Shape (m, 2) [m].
+            distances: Of the points from the outline, below 0 from within, shape (m,) [m].
+            slack: What distances may be off [m].
+        """
+
+    @abstractmethod
+    def touched(self, point: Floats, distance: float, slack: float) -> list[tuple[Floats, Floats]]:
+        """Return the places that `touch_counts` counts for one point: feet and outward normals."""
+
+    @abstractmethod
     def drawn(self) -> Floats:
         """Return vertices of the outline, or of a polygon that looks like it, shape (n, 2) [m]."""
 
@@ -185,16 +201,16 @@ class Polygon(Outline):
         return np.asarray(best)
 
     def touch_counts(self, points: Floats, distances: Floats, slack: float) -> Places:
-        """Return at how many places of the outline points lie at given distances, shape (m,).
+        """See `Outline`.
 
         An edge counts with the points beside it, a vertex bent outward with those beyond the ends
-        of both its edges; a tip in an inward vertex touches two edges.
+        of both its edges.
         """
         places = self._places(points, distances[:, np.newaxis], slack)
         return np.asarray(np.add.reduce(places[0], axis=1) + np.add.reduce(places[1], axis=1))
 
     def touched(self, point: Floats, distance: float, slack: float) -> list[tuple[Floats, Floats]]:
-        """Return the places that `touch_counts` counts for one point: feet and outward normals."""
+        """See `Outline`."""
         edges, corners = self._places(point[np.newaxis], distance, slack)
         found = []
         for edge in np.flatnonzero(edges[0]):

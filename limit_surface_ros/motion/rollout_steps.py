@@ -18,7 +18,6 @@ import numpy as np
 from limit_surface_ros.errors import SolverError
 from limit_surface_ros.motion.inward_corner import TWO_PLACES, Scene, push_in_corner
 from limit_surface_ros.motion.outcomes import MODES
-from limit_surface_ros.motion.outline import Polygon
 from limit_surface_ros.motion.push_batch import Contacts, PushBatch, contact_velocities
 from limit_surface_ros.motion.push_checks import as_complex, as_vectors_of
 from limit_surface_ros.motion.push_roots import SEPARATE
@@ -75,7 +74,6 @@ class Rollout:
         self._size = scene.outline.mean_radius
         self._exact = float(np.clip(0.05 * scene.tolerance / self._size, 4e-15, 1e-4))
         self._is_convex = scene.outline.is_convex
-        self._has_corners = isinstance(scene.outline, Polygon) and not self._is_convex
         self._paths = as_complex(paths.reshape(-1, 2)).reshape(paths.shape[:2])
         ways = np.diff(self._paths, axis=1)
         self._lengths = np.abs(ways)
@@ -155,6 +153,15 @@ class Rollout:
         closing = -(np.conj(as_complex(near.normals)) * heading).real
         gap = near.distances - self._radii[rows]
         touches = (gap <= _TOUCHING * self._size) & (closing > 0.0)
+        cornered = np.zeros(len(rows), dtype=bool)
+        if not self._is_convex:
+            # Of two places that it touches a tip may leave one, and push the other.
+            for place in np.flatnonzero(self._at_two_places(rows)):
+                pushed = push_in_corner(
+                    self._scene, centre[place], heading[place], float(self._radii[rows[place]])
+                )
+                cornered[place] = pushed.twist.any()
+        touches |= cornered
         moved = np.zeros(len(rows))
         away = np.flatnonzero(~touches)
         if len(away):
@@ -168,7 +175,7 @@ class Rollout:
         moved = np.where(hits, moved, rest)
         self._advance(rows, moved, ~hits)
         hit = rows[hits]
-        self._phase[hit] = _TOUCH
+        self._phase[hit] = np.where(cornered[hits], _CORNER, _TOUCH)
         self._fresh[hit] = True
         new = hit[np.isnan(self.touched_at[hit])]
         self.touched_at[new] = self._done_lengths[new]
@@ -216,6 +223,11 @@ class Rollout:
     def _follow_up(self, rows: Places, closing: Floats, steps: Floats) -> None:
         """Find which tips have left, and which now touch at two places."""
         on = self._phase[rows] != _DONE
+        two = np.zeros(len(rows), dtype=bool)
+        if not self._is_convex:
+            two = self._at_two_places(rows) & on
+            # The nearer place may open while the body turns into the tip at the other.
+            closing = np.where(two & (self._phase[rows] == _TOUCH), 1.0, closing)
         parted = np.flatnonzero(closing <= 0.0)
         left = rows[parted]
         if len(left):
@@ -236,17 +248,18 @@ class Rollout:
         turned = rows[on & self._fresh[rows] & (closing > 0.0)]
         self._phase[turned] = _FREE
         self.left_at[turned] = self._done_lengths[turned]
-        if self._has_corners:
-            assert isinstance(self._scene.outline, Polygon)
-            stays = rows[(self._phase[rows] == _TOUCH) | (self._phase[rows] == _CORNER)]
-            if len(stays):
-                tip, _, _ = self._ways(stays)
-                centre = as_vectors_of(_seen(self.poses[stays], tip)[1])
-                slack = TWO_PLACES * self._scene.tolerance
-                counts = self._scene.outline.touch_counts(centre, self._radii[stays], slack)
-                phase = np.where(counts > 1, _CORNER, _TOUCH)
-                self._fresh[stays[phase != self._phase[stays]]] = True
-                self._phase[stays] = phase
+        stays = (self._phase[rows] == _TOUCH) | (self._phase[rows] == _CORNER)
+        changed = stays & (two != (self._phase[rows] == _CORNER))
+        self._fresh[rows[changed]] = True
+        self._phase[rows[changed]] = np.where(two[changed], _CORNER, _TOUCH)
+
+    def _at_two_places(self, rows: Places) -> Bools:
+        """Return which tips touch the outline at two places, or more."""
+        tip, _, _ = self._ways(rows)
+        centre = as_vectors_of(_seen(self.poses[rows], tip)[1])
+        slack = TWO_PLACES * self._scene.tolerance
+        counts = self._scene.outline.touch_counts(centre, self._radii[rows], slack)
+        return np.asarray(counts > 1)
 
     def _rate(
         self, rows: Places, poses: Floats, tips: Complexes, directions: Complexes, corner: bool
@@ -329,8 +342,7 @@ class Rollout:
             found = self._batch.solve(contacts)
             assert found.wrenches is not None
             twists[some], modes[some], wrenches[some] = found.twists, found.modes, found.wrenches
-        if self._has_corners:
-            assert isinstance(self._scene.outline, Polygon)
+        if not self._is_convex:
             slack = 2.0 * TWO_PLACES * self._scene.tolerance
             radii = self._radii[steps.pushes]
             counts = self._scene.outline.touch_counts(as_vectors_of(centre), radii, slack)

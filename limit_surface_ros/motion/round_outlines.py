@@ -21,7 +21,7 @@ from limit_surface_ros.motion.outline import (
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.checks import Bools, Floats, Places
 
 # Rounds of the searches for a nearest point and a first touch.
 _ROUNDS = 60
@@ -95,6 +95,16 @@ class Ellipse(Outline):
         """See `Outline`."""
         return _touch_of_convex(self, starts, directions, radius)
 
+    def touch_counts(self, points: Floats, distances: Floats, slack: float) -> Places:
+        """See `Outline`: a tip outside touches one place."""
+        return (np.abs(self.nearest(points).distances - distances) <= slack).astype(np.intp)
+
+    def touched(self, point: Floats, distance: float, slack: float) -> list[tuple[Floats, Floats]]:
+        """See `Outline`."""
+        near = self.nearest(point[np.newaxis])
+        touches = abs(near.distances[0] - distance) <= slack
+        return [(near.points[0], near.normals[0])] if touches else []
+
     def drawn(self) -> Floats:
         """See `Outline`: 120 points."""
         angles = np.linspace(0.0, 2.0 * np.pi, 120, endpoint=False)
@@ -140,13 +150,42 @@ class SmoothCurve(Outline):
 
     def nearest(self, points: Floats) -> Nearest:
         """See `Outline`: Newton's method from the nearest of the curve's samples."""
+        square = self._sample_squares(points)
+        return self._from_samples(points, square.argmin(axis=1))
+
+    def touch_counts(self, points: Floats, distances: Floats, slack: float) -> Places:
+        """See `Outline`: the least distances along the curve."""
+        rows, samples = np.nonzero(self._least_samples(points))
+        near = self._from_samples(points[rows], samples)
+        touches = np.abs(near.distances - distances[rows]) <= slack
+        return np.bincount(rows[touches], minlength=len(points))
+
+    def touched(self, point: Floats, distance: float, slack: float) -> list[tuple[Floats, Floats]]:
+        """See `Outline`."""
+        samples = np.flatnonzero(self._least_samples(point[np.newaxis])[0])
+        near = self._from_samples(np.repeat(point[np.newaxis], len(samples), axis=0), samples)
+        touches = np.abs(near.distances - distance) <= slack
+        return list(zip(near.points[touches], near.normals[touches], strict=True))
+
+    def _sample_squares(self, points: Floats) -> Floats:
+        """Return squared distances of samples, up to a number for each point, shape (m, n)."""
         samples = self._samples.vertices
-        square = (samples**2).sum(axis=1) - 2.0 * points @ samples.T
-        start = self._places[square.argmin(axis=1)]
-        place = start
+        return np.asarray((samples**2).sum(axis=1) - 2.0 * points @ samples.T)
+
+    def _least_samples(self, points: Floats) -> Bools:
+        """Return which samples are nearer than their neighbours, shape (m, n)."""
+        square = self._sample_squares(points)
+        return np.asarray(
+            (square < np.roll(square, 1, axis=1)) & (square <= np.roll(square, -1, axis=1))
+        )
+
+    def _from_samples(self, points: Floats, samples: Places) -> Nearest:
+        """Return the least distances near samples, one for each point."""
+        place = start = self._places[samples]
         for _ in range(_ROUNDS):
-            arm = self._curve(place) - points
-            first, second = self._curve(place, 1), self._curve(place, 2)
+            arm = self._curve(np.mod(place, self._end)) - points
+            at = np.mod(place, self._end)
+            first, second = self._curve(at, 1), self._curve(at, 2)
             slope = (arm * first).sum(axis=1)
             speed = (first * first).sum(axis=1)
             bend = speed + (arm * second).sum(axis=1)
@@ -154,13 +193,11 @@ class SmoothCurve(Outline):
             step = slope / np.where(bend > 0.1 * speed, bend, speed)
             moved = np.clip(place - step, start - self._reach, start + self._reach)
             done = not (np.abs(moved - place) > 1e-14 * self._end).any()
-            place = np.mod(moved, self._end) if done else moved
+            place = moved
             if done:
                 break
-        feet, first = (
-            self._curve(np.mod(place, self._end)),
-            self._curve(np.mod(place, self._end), 1),
-        )
+        place = np.mod(place, self._end)
+        feet, first = self._curve(place), self._curve(place, 1)
         first /= np.hypot(*first.T)[:, np.newaxis]
         normals = np.stack([first[:, 1], -first[:, 0]], axis=1)
         return Nearest(feet, normals, ((points - feet) * normals).sum(axis=1))

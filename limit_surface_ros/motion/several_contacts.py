@@ -40,6 +40,8 @@ _STILL = 1e-10
 _SCANNED = 200
 # Length of a cross product of scaled unit vectors below which they are one direction.
 _PARALLEL = 1e-12
+# Distance of two contacts, in characteristic lengths, below which they are one.
+_ONE_POINT = 1e-9
 # How the pusher slides where the body slips to the right and to the left.
 _MODES = (ContactMode.SLIDE_LEFT, ContactMode.SLIDE_RIGHT)
 
@@ -190,6 +192,7 @@ class TwoContacts:
         self._surface, self._points, self._normals, self._edges = surface, points, normals, edges
         self._twist = twist
         self._unit = surface.scaling.twist_unit
+        self._length = surface.scaling.characteristic_length
         self._cone = _cone(surface, points, normals, edges)
         self._velocities = self._at_contacts(twist)
         self._approach = (self._velocities * normals).sum(axis=1)
@@ -213,12 +216,17 @@ class TwoContacts:
         return np.stack([vx - omega * y, vy + omega * x], axis=1)
 
     def _both_stick(self) -> list[TwoPointPush]:
-        wrench = self._surface.wrench_of_twist(self._twist)
+        twist = self._twist
+        if np.ptp(self._points, axis=0).max() <= _ONE_POINT * self._length:
+            # Both are at one point, about which the body may turn: without a moment there.
+            velocity = self._velocities[0]
+            twist = push(self._surface, self._points[0], velocity, np.inf, velocity).twist
+        wrench = self._surface.wrench_of_twist(twist)
         inside, shares = _shares(self._cone, (wrench / self._surface.scaling.wrench_unit)[None])
         if not inside[0]:
             return []
         stick = (ContactMode.STICK, ContactMode.STICK)
-        return [TwoPointPush(self._twist.copy(), stick, wrench, self._forces(shares[0]))]
+        return [TwoPointPush(twist.copy(), stick, wrench, self._forces(shares[0]))]
 
     def _forces(self, shares: Floats) -> Floats:
         """Return the forces at both contacts (2, 2) of shares of the four edges' unit forces."""

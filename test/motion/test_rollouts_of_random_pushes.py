@@ -188,6 +188,27 @@ def test_a_tip_stuck_in_an_inward_corner_carries_the_body_along():
     np.testing.assert_allclose(run.wrenches[-1], [0.0, -1.0, 0.0], atol=1e-4)
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_a_tip_that_does_not_fit_into_a_hollow_touches_both_of_its_sides(friction):
+    around = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
+    radius = 0.05 * (1.0 + 0.45 * np.cos(4.0 * around))
+    hollow = SmoothCurve(np.stack([radius * np.cos(around), radius * np.sin(around)], axis=1))
+    start = np.array([0.06, 0.06])
+    way = [start, start - np.array([0.05, 0.045])]
+    tip = 0.012
+    arguments = SURFACES["norms"], hollow, tip, friction, [0, 0, 0], way
+    run = simulate_push(*arguments, accuracy=1e-4)
+    fine = simulate_push(*arguments, accuracy=1e-5)
+    assert metric(run.end_pose, fine.end_pose, hollow) < 1e-4
+    c, s = np.cos(run.poses[:, 2]), np.sin(run.poses[:, 2])
+    x, y = (run.tips - run.poses[:, :2]).T
+    seen = np.stack([c * x + s * y, c * y - s * x], axis=1)
+    distances = hollow.nearest(seen).distances - tip
+    assert distances.min() > -1e-4
+    counts = hollow.touch_counts(seen, np.full(len(seen), tip), 1e-4)
+    assert counts.max() == 2
+
+
 def test_round_outlines_agree_with_polygons_of_many_edges():
     around = np.linspace(0, 2 * np.pi, 600, endpoint=False)
     dots = np.stack([0.0525 * np.cos(around), 0.0785 * np.sin(around)], axis=1)
