@@ -18,10 +18,10 @@ import numpy as np
 from limit_surface_ros.checks import as_positive
 from limit_surface_ros.decay.basis import as_rates
 from limit_surface_ros.decay.certify import LargestError, certified_error
-from limit_surface_ros.decay.coefficients import ResponseFit, fit_response
+from limit_surface_ros.decay.coefficients import ResponseFit, fit_response, norm_of
 from limit_surface_ros.decay.delay.rates import dde_rates
 from limit_surface_ros.decay.esprit import continued_rates, esprit_choices, esprit_rates
-from limit_surface_ros.decay.grids import is_steep
+from limit_surface_ros.decay.grids import fit_times, is_steep
 from limit_surface_ros.decay.least_squares import least_squares_fit, require_samples
 from limit_surface_ros.decay.neutral import neutral_rates
 from limit_surface_ros.decay.noise import LEAST_SAMPLES, is_noisy, noise_level
@@ -271,7 +271,10 @@ def _fitted(
     envelope: float | None,
     tell: Progress,
 ) -> tuple[RateChoice, ResponseFit]:
-    choice = _choose(response, terms, end, method, options, tell)
+    if method == "best":
+        choice = _best(response, terms, end, norm, options, tell)
+    else:
+        choice = _choose(response, terms, end, method, options, tell)
     free = fit_response(choice.rates, response, end, norm)
     if envelope is None:
         return choice, free
@@ -321,10 +324,8 @@ def _choose(
         choice = esprit_rates(response, terms, end)
     elif method == "polished":
         choice = _polished(response, terms, end, tell)
-    elif method == "steep":
-        choice = steep_rates(response, terms, end)
     else:
-        return _best(response, terms, end, options, tell)
+        choice = steep_rates(response, terms, end)
     tell(f"{method}: {len(choice.rates)} rates, error {choice.error:.4g}")
     return choice
 
@@ -353,9 +354,17 @@ def _polished(response: Target, terms: int, end: float, tell: Progress) -> RateC
 
 
 def _best(
-    response: Target, terms: int, end: float, options: Options, tell: Progress
+    response: Target,
+    terms: int,
+    end: float,
+    norm: str | Criterion,
+    options: Options,
+    tell: Progress,
 ) -> RateChoice:
-    """Keep the best of the methods that need no kernel; one that fails does not spoil others."""
+    """Keep the best of the methods that need no kernel; one that fails does not spoil others.
+
+    The best is that whose coefficients are best in the norm that is asked for.
+    """
     choices: list[RateChoice] = []
     failure: LimitSurfaceError | None = None
     methods = ("polished", "neutral", *(("steep",) if is_steep(response, end) else ()))
@@ -367,4 +376,14 @@ def _best(
             tell(f"{method}: {error}")
     if not choices:
         raise SolverError(f"no method found rates; the last said: {failure}")
-    return min(choices, key=lambda choice: choice.error)
+    if norm == "inf":
+        return min(choices, key=lambda choice: choice.error)
+    # On the same times for all, so that their values compare.
+    fastest = max(float(np.abs(choice.rates.imag).max()) for choice in choices)
+    times = fit_times(response, end, fastest)
+
+    def value(choice: RateChoice) -> float:
+        fit = fit_response(choice.rates, response, end, norm)
+        return norm_of(fit.sum(times) - response(times), norm)
+
+    return min(choices, key=value)

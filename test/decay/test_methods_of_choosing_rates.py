@@ -164,3 +164,13 @@ def test_records_whose_samples_are_not_uniform_are_met_at_them_too():
     result = fit_decay(record, 2, 4.0, "polished")
     assert result.fit.max_error < 1e-9
     np.testing.assert_allclose(np.sort(result.choice.rates.real), [-3.0, -1.0], rtol=1e-6)
+
+
+def test_the_best_is_best_in_the_norm_that_is_asked_for():
+    times = np.linspace(0.0, 6.0, 301)
+    record = Record(times, examples.four_impulses()(times))
+    best = fit_decay(record, 7, 6.0, "best", "2").fit
+    assert best.norm == "2"
+    for method in ("polished", "neutral"):
+        other = fit_decay(record, 7, 6.0, method, "2").fit
+        assert best.grid_error <= other.grid_error * (1.0 + 1e-9)
