@@ -12,6 +12,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from limit_surface_ros.decay.fit import METHODS, fit_decay
+from limit_surface_ros.decay.targets import Record
 from limit_surface_ros.errors import LimitSurfaceError, RangeError
 from limit_surface_ros.tools.common.decay_input import add_input_options, read_input
 from limit_surface_ros.tools.common.program import program_parser, progress_bar, run_program
@@ -36,7 +37,10 @@ def parser() -> argparse.ArgumentParser:
     top = program_parser("compare_decays", __doc__, EXAMPLES, "response", "bag")
     add_input_options(top)
     top.add_argument(
-        "--methods", nargs="+", choices=METHODS, default=list(METHODS), help="default: all"
+        "--methods",
+        nargs="+",
+        choices=METHODS,
+        help="default: all; least_squares of records alone, which have samples",
     )
     top.add_argument(
         "-n", "--terms", nargs="+", type=int, default=[5, 9, 15], help="default: 5 9 15"
@@ -70,7 +74,8 @@ def run(options: argparse.Namespace) -> None:
         raise RangeError(f"--terms must be at least 1 each, got {min(options.terms)}")
     chosen = method_options(options)
     given = read_input(options)
-    pairs = [(method, terms) for terms in options.terms for method in options.methods]
+    usable = [m for m in METHODS if m != "least_squares" or isinstance(given.target, Record)]
+    pairs = [(method, terms) for terms in options.terms for method in options.methods or usable]
     rows: list[list[str]] = []
     refusals: dict[str, str] = {}
     with progress_bar("fits") as progress:

@@ -40,8 +40,7 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.decay.certify import LargestError
     from limit_surface_ros.decay.fit import DecayFit
-    from limit_surface_ros.tools.common.csv_options import OF_RESPONSES
-from limit_surface_ros.tools.common.decay_input import DecayInput
+    from limit_surface_ros.tools.common.decay_input import DecayInput
 
 EXAMPLES = """methods:
   dde       characteristic roots of the response's own delay system (the thesis); its maximum
@@ -59,14 +58,16 @@ After the interval the response is assumed to stay within its largest value over
 it. Every fit is held to that there, or to its error if that is larger, and what it provably never
 exceeds is printed and written beside the assumption.
 
-Records: a fit is made on the samples and its error measured there; only what the sum strays
-between samples beyond the record's own bends is counted too. Methods that need a function (the
-kernel of dde, the samples of esprit from a record that is not uniform) take straight lines.
+Records: a fit is made on the samples and its error measured there; only how far the sum departs
+from lines between samples beyond the record's own curvature is counted too. Methods that need a
+function (the kernel of dde, the samples of esprit from a record that is not uniform) take straight
+lines.
 
 examples:
   fit_decay f1 --terms 9 --output hockey_stick.yaml
   fit_decay f1 --terms 15 --method dde --max-delay 6 --output thesis.yaml
   fit_decay relaxation.csv --value-column force --terms 7 --norm 2 --output relaxation.yaml
+  fit_decay noisy.csv --terms auto --offset free --output creep.yaml
   fit_decay bag_folder --topic /wrench --field wrench.force.x --start 1.5 --terms 5 \\
       --output relaxation.yaml
 """
