@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 AMPLITUDE_SPREAD, RATE_SPREAD, DELAY_SPREAD, DECAY_SPREAD, WEIGHT_SPREAD = 3.0, 0.7, 0.3, 0.7, 0.5
 # The jump of the slope may be so many deviations of the delay away.
 DELAY_REACH = 3.5
-# log s stays within these.
-MOST_RATE_CHANGE = 3.0
+# log s stays within this, and d within so many prior deviations.
+MOST_RATE_CHANGE, MOST_DELAY = 3.0, 10.0
 
 
 @dataclass(frozen=True)
@@ -155,6 +155,13 @@ class DelayFamily(RateFamily):
         spread = np.array([AMPLITUDE_SPREAD, RATE_SPREAD, DELAY_SPREAD / fastest])
         return np.array([1.0, 0.0, 0.0]), spread
 
+    def bounded(self, numbers: Floats) -> Floats:
+        """Keep log s and the delay within what can be told."""
+        kept = super().bounded(numbers)
+        most = MOST_DELAY * self.spread[2]
+        kept[2] = np.clip(kept[2], -most, most)
+        return kept
+
     def values(self, times: Floats, numbers: Floats) -> tuple[Floats, Floats]:
         """Return the response and its slopes in the numbers."""
         amplitude, speed, delay = numbers[0], np.exp(numbers[1]), numbers[2]
@@ -204,10 +211,13 @@ class DecayFamily(RateFamily):
 
     def values(self, times: Floats, numbers: Floats) -> tuple[Floats, Floats]:
         """Return the response and its slopes in the numbers."""
-        values, slopes = super().values(times, numbers[:2])
-        fading = np.exp(-numbers[2] * times)
-        faded: Floats = values * fading
-        return faded, np.column_stack([slopes * fading[:, np.newaxis], -times * faded])
+        amplitude, speed, decay = numbers[0], np.exp(numbers[1]), numbers[2]
+        # In one exponential: the decay alone may overflow where the product does not.
+        waves = np.exp(np.multiply.outer(times, speed * self.rates - decay)) * self.coefficients
+        shape = waves.real.sum(axis=1)
+        slope = amplitude * speed * times * (waves * self.rates).real.sum(axis=1)
+        values: Floats = amplitude * shape
+        return values, np.stack([shape, slope, -times * values], axis=1)
 
     def learnt(self, numbers: Floats) -> Learnt:
         """Return the response that the numbers stand for."""

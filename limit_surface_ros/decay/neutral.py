@@ -129,5 +129,8 @@ def neutral_rates(
     )
     damping, length = (float(value) for value in np.exp(result.x))
     parameters = {"damping": damping, "length": length}
-    system = None if len(tail) else neutral_system(free, max(damping, LEAST_DECAY / end), length)
+    decay = max(damping, LEAST_DECAY / end)
+    # With tail rates, or a feedback that vanishes, they are the roots of no neutral equation.
+    neutral = len(tail) == 0 and math.exp(-decay * length) > 0.0
+    system = neutral_system(free, decay, length) if neutral else None
     return judged(rates_of(result.x), response, end, "neutral", system, parameters)
