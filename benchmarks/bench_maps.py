@@ -8,6 +8,9 @@ wrote before. A plain C loop is the peer of `bench_maps_limits`.
 
 from __future__ import annotations
 
+import threading
+import time
+
 import numpy as np
 from interleaved import interleaved
 from scipy.optimize import root
@@ -24,6 +27,8 @@ SCALING = Scaling(0.1, 5.0)
 SIZES = (100, 1_000, 10_000, 100_000, 1_000_000)
 # Size of the batch at which ours stands beside the ellipsoid.
 COMPARED = 10_000
+# Calls in a row, and the rows of each.
+CALLS, FEW = 20_000, 10
 # Longest batch [s].
 PATIENCE = 1.5
 MAPS = {"wrench -> twist": "twist_of_wrench", "twist -> wrench": "wrench_of_twist"}
@@ -115,6 +120,68 @@ def times_by_size() -> None:
     print()
 
 
+def rescaled() -> None:
+    """Maps of a surface under another weight, which shares its shape, and making it."""
+    print("### Another weight, times the time of the first (goal: at most 1.2)\n")
+    print(
+        f"| kind | map | alone | {COMPARED:.0e} | `scaled()` itself [us] |\n|---|---|---|---|---|"
+    )
+    rows = np.random.default_rng(2).standard_normal((COMPARED, 3)) * [1.0, 1.0, 0.1]
+    for name, surface in kinds().items():
+        surface.prepare()
+        other = surface.scaled(1.7)
+        making = interleaved({"it": lambda s=surface: s.scaled(1.7)})["it"]
+        for map_name, method in MAPS.items():
+            ratios = []
+            for vectors in (rows[0].copy(), rows):
+                times = interleaved(
+                    {
+                        "first": lambda s=surface, m=method, v=vectors: getattr(s, m)(v),
+                        "other": lambda s=other, m=method, v=vectors: getattr(s, m)(v),
+                    }
+                )
+                ratios.append(f"{times['other'] / times['first']:.2f}")
+            cells = " | ".join(ratios)
+            print(f"| {name} | {map_name} | {cells} | {making * 1e6:.1f} |", flush=True)
+    print()
+
+
+def steady() -> None:
+    """The slowest of many calls of few rows: no call pays for what was asked before."""
+    print(f"### The slowest of {CALLS} calls of {FEW} rows\n")
+    print("A new surface of each kind; while it is prepared in a thread, as after a reload, too.")
+    print("Goal: at most 5 times the median and 5 ms. In processor time of the calling thread,")
+    print("so that other programs do not count.\n")
+    print("| kind | map | median [us] | slowest [us] | slowest while prepared [us] |")
+    print("|---|---|---|---|---|")
+    rows = np.random.default_rng(3).standard_normal((FEW, 3)) * [1.0, 1.0, 0.1]
+    for name in kinds():
+        for map_name, method in MAPS.items():
+            cells = []
+            for beside in (False, True):
+                surface = kinds()[name]
+                call = getattr(surface, method)
+                call(rows)
+                thread = threading.Thread(target=surface.prepare)
+                if beside:
+                    thread.start()
+                times = np.empty(CALLS)
+                for index in range(CALLS):
+                    begin = time.thread_time()
+                    call(rows)
+                    times[index] = time.thread_time() - begin
+                if beside:
+                    thread.join()
+                middle, worst = np.median(times), times.max()
+                missed = "" if worst <= 5.0 * middle + 5e-3 else " missed"
+                cells.append((middle, f"{1e6 * worst:.0f}{missed}"))
+            median = f"{1e6 * cells[0][0]:.1f}"
+            print(
+                f"| {name} | {map_name} | {median} | {cells[0][1]} | {cells[1][1]} |", flush=True
+            )
+    print()
+
+
 def patch_against_root() -> None:
     """A patch of about 800 support points, wrench to twist, against scipy.optimize.root."""
     surface = ContactPatch.of_shape(shapes.rectangle([0.1, 0.1], 784)).surface(0.3, 10.0)
@@ -156,6 +223,8 @@ def patch_against_root() -> None:
 def main() -> int:
     """Print the tables."""
     times_by_size()
+    rescaled()
+    steady()
     patch_against_root()
     return 0
 

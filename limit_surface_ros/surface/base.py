@@ -235,6 +235,20 @@ class LimitSurface(ABC):
         unit_in, unit_out = self.scaling.wrench_unit, self.scaling.twist_unit
         return self._mapped("wrench", wrench, unit_in, self.shape.motions, unit_out)
 
+    def gradient_twist(self, wrench: ArrayLike) -> Floats:
+        """Direction of the gradient, at the wrench itself, of the function that defines a kind.
+
+        For all kinds but power sums of mixed exponents this is `twist_of_wrench`; for those it is
+        so on the surface alone.
+
+        Args:
+            wrench: Shape (..., 3), (fx, fy, tau_z) in [N, N, N m], not zero.
+
+        Returns:
+            Shape (..., 3) twists (vx, vy, omega_z) of unit norm in scaled variables.
+        """
+        return self.twist_of_wrench(wrench)
+
     def twist_and_load_factor(self, wrench: ArrayLike) -> tuple[Floats, Floats]:
         """Direction of the incipient motion and load factor, for less than both cost apart.
 

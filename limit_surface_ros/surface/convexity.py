@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limit_surface_ros.surface.gauges.quartic import Quartic
+from limit_surface_ros.surface.gauges.sum_of_squares import lowest_curvature
 from limit_surface_ros.surface.linalg import even_directions
 
 if TYPE_CHECKING:
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
 _DIRECTIONS = 20_000
 # Keeps a gauge without curvature from dividing zero by zero.
 _TINY = np.finfo(np.float64).tiny
+# Of these, where descents to the lowest curvature of a polynomial start.
+_DESCENTS = 300
 # Parts of them that fit the cache.
 _BLOCKS = 6
 # Curvature, relative to the largest at the same load, below which a surface bends inward.
@@ -58,9 +62,9 @@ def is_convex(surface: LimitSurface) -> Convexity:
     """Tell whether a surface is convex, with a certificate or a counter-example.
 
     Where no theorem decides, the curvature of the gauge is looked at in 20 000 directions of load
-    spread evenly over the sphere. If one is negative, a chord that leaves the surface there is
-    the counter-example; if none is, that is no proof and `proved` is false. Of a kind that does
-    not give its curvature, chords alone are looked at.
+    spread evenly over the sphere, and for a polynomial where it is lowest. If one is negative, a
+    chord that leaves the surface there is the counter-example; if none is, that is no proof and
+    `proved` is false. Of a kind that does not give its curvature, chords alone are looked at.
     """
     theorem = surface.convex_because
     if theorem is not None:
@@ -73,12 +77,18 @@ def is_convex(surface: LimitSurface) -> Convexity:
     blocks = np.array_split(directions, _BLOCKS)
     relative = np.concatenate([_least_curvature(_hessians(gauge, block)) for block in blocks])
     share = float((relative < _INWARD).mean())
+    worst = directions[relative.argmin()]
+    if isinstance(gauge, Quartic):
+        value, load, _ = lowest_curvature(gauge, directions[:: len(directions) // _DESCENTS].T)
+        if value < 0.0:
+            worst = load
+            # A dent that lies between the directions.
+            share = share or 0.5 / _DIRECTIONS
     if share == 0.0:
         reason = f"no direction of {_DIRECTIONS} has a negative curvature"
         return Convexity(True, False, reason, 0.0, None)
-    worst = int(relative.argmin())
-    hessian = _hessians(gauge, directions[worst : worst + 1])[:, :, 0]
-    chord = _outer_chord(surface, directions[worst], np.linalg.eigh(hessian)[1][:, 0])
+    hessian = _hessians(gauge, worst[np.newaxis])[:, :, 0]
+    chord = _outer_chord(surface, worst, np.linalg.eigh(hessian)[1][:, 0])
     reason = f"it bends inward in {100.0 * share:.2g} % of the directions of load"
     return Convexity(False, chord is not None, reason, share, chord)
 

@@ -26,7 +26,11 @@ if TYPE_CHECKING:
 
 
 def velocity_error(surface: LimitSurface, pairs: Pairs) -> Floats:
-    """Return |v - v^|: the pairs' unit scaled twists against the model's for their wrenches.
+    """Return |v - v^| with v^ along the gradient of H at the load itself: the thesis's, in 3.5.
+
+    H is the function that defines the surface, H = 1. For a power sum of mixed exponents and a
+    load off the surface, its gradient there is not the normal where the ray of the load leaves,
+    which is the motion that the model predicts; see `direction_error`.
 
     Args:
         surface: The model.
@@ -35,11 +39,28 @@ def velocity_error(surface: LimitSurface, pairs: Pairs) -> Floats:
     Returns:
         Shape (n,), from 0 to 2.
     """
+    return _distances(surface, pairs, surface.gradient_twist(pairs.wrenches))
+
+
+def direction_error(surface: LimitSurface, pairs: Pairs) -> Floats:
+    """Return |v - v^|: the pairs' unit scaled twists against those that the model predicts.
+
+    Args:
+        surface: The model.
+        pairs: Loads and the motions they caused; only the loads' directions matter.
+
+    Returns:
+        Shape (n,), from 0 to 2.
+    """
+    return _distances(surface, pairs, surface.twist_of_wrench(pairs.wrenches))
+
+
+def _distances(surface: LimitSurface, pairs: Pairs, twists: Floats) -> Floats:
+    """Return the distances between the pairs' twists and others, all made unit scaled twists."""
     unit = surface.scaling.twist_unit
     measured = pairs.twists / unit
     measured = measured / np.linalg.norm(measured, axis=1, keepdims=True)
-    predicted = surface.twist_of_wrench(pairs.wrenches) / unit
-    return np.asarray(np.linalg.norm(measured - predicted, axis=1))
+    return np.asarray(np.linalg.norm(measured - twists / unit, axis=1))
 
 
 def angle_error(surface: LimitSurface, pairs: Pairs) -> Floats:
@@ -48,7 +69,7 @@ def angle_error(surface: LimitSurface, pairs: Pairs) -> Floats:
     Returns:
         Shape (n,), from 0 to pi.
     """
-    return np.asarray(2.0 * np.arcsin(np.minimum(0.5 * velocity_error(surface, pairs), 1.0)))
+    return np.asarray(2.0 * np.arcsin(np.minimum(0.5 * direction_error(surface, pairs), 1.0)))
 
 
 def mean_angle(surface: LimitSurface, pairs: Pairs) -> float:

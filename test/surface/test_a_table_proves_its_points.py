@@ -208,6 +208,20 @@ def test_one_large_batch_makes_the_table_that_it_is_answered_from():
     np.testing.assert_allclose(wrenches[:FEW], few, atol=1e-9 * np.abs(few).max())
 
 
+def test_a_cell_that_two_sheets_share_is_not_read():
+    surface = prepared(surface_of("low powers", 1))
+    tabulated = surface.shape.solver._solver
+    ticks = np.linspace(-1.0, 1.0, 161)
+    a, b = np.meshgrid(ticks, ticks, indexing="ij")
+    normals = np.array([a, b, 0.5 * (1.0 - a * a - b * b)])
+    points = tabulated._solver.solve(normals.reshape(3, -1))[0].reshape(normals.shape)
+    # Within a cell of one sheet, points differ by little.
+    cells = np.lib.stride_tricks.sliding_window_view(points, (3, 3), axis=(1, 2))[:, ::2, ::2]
+    spread = np.ptp(cells, axis=(3, 4)).max(axis=0).ravel() / np.abs(points).max()
+    assert (spread > 0.5).any()
+    assert (spread[tabulated._table._useful] < 0.5).all()
+
+
 def test_a_point_that_the_table_cannot_prove_is_not_certain():
     surface = PointContacts([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]], [0.5, 0.5, 0.5])
     tabulated = surface.shape.solver._solver

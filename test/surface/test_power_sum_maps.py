@@ -174,6 +174,8 @@ def test_one_load_gives_what_it_gives_among_many():
         ([np.eye(3)], [1.0, 0.5], ShapeError, r"\(1,\)"),
         ([np.eye(3)], [0.0], RangeError, r"\(0, 1\]"),
         ([np.eye(3)], [1.1], RangeError, r"\(0, 1\]"),
+        ([np.eye(3)] * 3, [1e-3] * 3, RangeError, "are too small: .* 4e[+]238 times smaller"),
+        ([np.eye(3)] * 3, [1e-5] * 3, RangeError, "are too small"),
         ([np.diag([1.0, 1.0, -1.0])], [1.0], MatrixError, "lowest eigenvalue is -1"),
         ([[[1, 1, 0], [0, 1, 0], [0, 0, 1]]], [1.0], MatrixError, "symmetric"),
         ([np.zeros((3, 3))], [1.0], MatrixError, "is zero"),

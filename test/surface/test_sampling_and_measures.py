@@ -107,3 +107,32 @@ def test_the_empirical_distribution_rises_to_one():
     values, shares = measures.empirical_distribution([3.0, 1.0, 2.0, 2.0])
     np.testing.assert_array_equal(values, [1.0, 2.0, 2.0, 3.0])
     np.testing.assert_array_equal(shares, [0.25, 0.5, 0.75, 1.0])
+
+
+def test_velocity_error_takes_the_gradient_at_the_load_itself():
+    rng = np.random.default_rng(8)
+    roots = rng.standard_normal((3, 3, 3))
+    surface = PowerSum.thesis(np.swapaxes(roots, 1, 2) @ roots, Scaling(0.1, 2.0))
+    pairs = sampling.random_motions(BALL, 50, rng=9)
+    gradient = surface.gradient(pairs.wrenches / surface.scaling.wrench_unit)
+    gradient /= np.linalg.norm(gradient, axis=1, keepdims=True)
+    measured = pairs.twists / surface.scaling.twist_unit
+    measured /= np.linalg.norm(measured, axis=1, keepdims=True)
+    expected = np.linalg.norm(measured - gradient, axis=1)
+    np.testing.assert_allclose(measures.velocity_error(surface, pairs), expected, rtol=1e-12)
+    # Off the surface that is another direction than the motion which the model predicts.
+    assert np.abs(measures.direction_error(surface, pairs) - expected).max() > 1e-3
+    on_surface = Pairs(pairs.wrenches / surface.load_factor(pairs.wrenches)[:, None], pairs.twists)
+    np.testing.assert_allclose(
+        measures.velocity_error(surface, on_surface),
+        measures.direction_error(surface, pairs),
+        rtol=1e-9,
+    )
+
+
+def test_velocity_and_direction_are_one_where_the_gradient_is_the_same_along_a_ray():
+    pairs = sampling.random_motions(BALL, 50, rng=9)
+    for surface in (BALL, PointContacts(TRIANGLE, np.full(3, 0.5))):
+        np.testing.assert_array_equal(
+            measures.velocity_error(surface, pairs), measures.direction_error(surface, pairs)
+        )

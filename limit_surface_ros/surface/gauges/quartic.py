@@ -28,6 +28,9 @@ _MONOMIAL_OF_ENTRY = np.array(
     [_PLACES[tuple(axes.count(axis) for axis in range(3))] for axes in product(range(3), repeat=4)]
 )
 _ENTRIES_OF_MONOMIAL = np.bincount(_MONOMIAL_OF_ENTRY)
+# Descents to the lowest value on the sphere, and their steps.
+_DESCENTS = 20
+_STEPS = 400
 
 
 class Quartic:
@@ -52,13 +55,18 @@ class Quartic:
 
     def in_frame(self, frame: Floats) -> Quartic:
         """Return the polynomial of y with f = F y."""
-        entries = (self._coefficients / _ENTRIES_OF_MONOMIAL)[_MONOMIAL_OF_ENTRY]
-        tensor = entries.reshape(3, 3, 3, 3)
+        tensor = self.tensor
         for _ in range(4):
             # Each turn takes the first axis into the frame and puts it last.
             tensor = np.tensordot(tensor, frame, axes=(0, 0))
         sums = np.bincount(_MONOMIAL_OF_ENTRY, weights=tensor.ravel())
         return Quartic(sums.astype(np.float64))
+
+    @property
+    def tensor(self) -> Floats:
+        """The symmetric T with P(f) = T_ijkl f_i f_j f_k f_l, shape (3, 3, 3, 3)."""
+        entries = (self._coefficients / _ENTRIES_OF_MONOMIAL)[_MONOMIAL_OF_ENTRY]
+        return np.asarray(entries.reshape(3, 3, 3, 3))
 
     def polynomial(self, loads: Floats) -> Floats:
         """Return P (m,) at loads (3, m)."""
@@ -78,6 +86,17 @@ class Quartic:
         """Return the Hessian (3, 3, m) of P at loads (3, m)."""
         hessian: Floats = self.second.reshape(9, 6) @ _quadratics(loads)
         return hessian.reshape(3, 3, -1)
+
+    def lowest(self, loads: Floats) -> Floats:
+        """Return the unit load (3,) of the lowest P that descents from loads (3, m) lead to."""
+        values = self.polynomial(loads)
+        points = loads[:, np.argsort(values)[:_DESCENTS]]
+        # Less than a step of 1 / curvature, so that each lowers P on the sphere.
+        shift = 12.0 * np.abs(self._coefficients).sum() or 1.0
+        for _ in range(_STEPS):
+            points = shift * points - self.gradient(points)
+            points /= np.sqrt((points * points).sum(axis=0))
+        return np.asarray(points[:, self.polynomial(points).argmin()])
 
     def values(self, loads: Floats) -> Floats:
         """Return P^(1/4) (m,)."""

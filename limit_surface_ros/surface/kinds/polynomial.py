@@ -18,6 +18,7 @@ from limit_surface_ros.errors import MatrixError, ShapeError
 from limit_surface_ros.surface.base import FileArray, LimitSurface
 from limit_surface_ros.surface.gauges.quartic import MONOMIALS, Quartic
 from limit_surface_ros.surface.gauges.scalar import QuarticScalar
+from limit_surface_ros.surface.gauges.sum_of_squares import proves_convex, proves_positive
 from limit_surface_ros.surface.linalg import even_directions
 from limit_surface_ros.surface.scaling import Scaling
 from limit_surface_ros.surface.shape import GaugeShape
@@ -39,6 +40,8 @@ if TYPE_CHECKING:
 __all__ = ["MONOMIALS", "Polynomial"]
 
 _CHECKED_DIRECTIONS = 2000
+# Least P(f) / |f|^4 that a polynomial must have where its surface is about the unit sphere.
+_MARGIN = 1e-9
 _STARTS = 500
 # Vectors up to which several climbs each, one after another, are quicker than all at once.
 _FEW_WITH_PEAKS = 8
@@ -71,13 +74,7 @@ class Polynomial(LimitSurface):
             raise ShapeError(f"coefficients must have shape (15,), got {coefficients.shape}")
         coefficients.setflags(write=False)
         object.__setattr__(self, "coefficients", coefficients)
-        directions = even_directions(_CHECKED_DIRECTIONS)
-        values = self.value(directions)
-        if not values.min() > 0.0:
-            raise MatrixError(
-                "the polynomial must be positive: it is "
-                f"{values.min():.6g} at the scaled load {directions[values.argmin()].tolist()}"
-            )
+        _check_positive(self._quartic)
 
     @cached_property
     def _quartic(self) -> Quartic:
@@ -93,6 +90,11 @@ class Polynomial(LimitSurface):
         """Return the gradient of P at scaled loads (..., 3); shape (..., 3)."""
         array = as_vectors("load", load)
         return np.asarray(self._quartic.gradient(array.reshape(-1, 3).T).T.reshape(array.shape))
+
+    @cached_property
+    def convex_because(self) -> str | None:
+        """Why the surface is convex, if it is: by a certificate of its own numbers."""
+        return "its Hessian is a sum of squares" if proves_convex(self._quartic) else None
 
     def _new_shape(self) -> _QuarticShape:
         return _QuarticShape(self._quartic)
@@ -112,13 +114,39 @@ class _QuarticShape(GaugeShape):
         quartic = self._quartic.in_frame(frame)
         scalar = QuarticScalar(quartic.first, quartic.second)
         directions = even_directions(2 * _STARTS).T
-        curvatures = np.linalg.eigvalsh(
-            np.moveaxis(quartic.derivatives(directions, np.zeros(2 * _STARTS))[2], -1, 0)
-        )
-        # The gauge is flat along the ray; any curvature below that is a dent.
-        if curvatures[:, 0].min() > -1e-9 * curvatures[:, -1].max():
+        if proves_convex(quartic):
             newton = SmallBatch(ConvexNewton(quartic, directions), scalar)
             return InFrame(frame, Tabulated(quartic, newton))
         search = PeakSearch(quartic, directions[:, _STARTS:])
         peaks = SmallBatch(search, scalar, few=_FEW_WITH_PEAKS)
         return InFrame(frame, Tabulated(quartic, peaks, convex=False))
+
+
+def _check_positive(quartic: Quartic) -> None:
+    """Prove that P is positive, in axes in which the surface P = 1 is about round.
+
+    Raises:
+        MatrixError: It is not, or only by what rounding may have added.
+    """
+    directions = even_directions(_CHECKED_DIRECTIONS).T
+    if quartic.polynomial(directions).min() > 0.0:
+        try:
+            with np.errstate(invalid="ignore"):
+                frame = round_frame(quartic)
+            if not np.isfinite(frame).all():
+                raise np.linalg.LinAlgError("a gauge without values has no frame")
+            round_quartic = quartic.in_frame(frame)
+            if proves_positive(round_quartic, _MARGIN):
+                return
+            lowest = frame @ round_quartic.lowest(directions)
+        except np.linalg.LinAlgError:
+            lowest = quartic.lowest(directions)
+    else:
+        lowest = quartic.lowest(directions)
+    lowest /= np.sqrt(lowest @ lowest)
+    value = float(quartic.polynomial(lowest[:, np.newaxis])[0])
+    raise MatrixError(
+        "the polynomial must be positive: it is "
+        f"{value:.6g} at the scaled load {[float(f'{x:.6g}') for x in lowest]}"
+        + (", which is too little to be certain of it nearby" if value > 0.0 else "")
+    )

@@ -12,11 +12,13 @@ import numpy as np
 from limit_surface_ros.checks import as_floats, as_vectors
 from limit_surface_ros.errors import RangeError, ShapeError
 from limit_surface_ros.surface.base import FileArray, LimitSurface
+from limit_surface_ros.surface.gauges.power_scale import power_scale
 from limit_surface_ros.surface.linalg import as_psd_matrices, null_space, of_unit_length, root_of
 from limit_surface_ros.surface.scaling import Scaling
 from limit_surface_ros.surface.shape import GaugeShape
 from limit_surface_ros.surface.support.power_sum_solver import (
     gauge_of,
+    is_norm,
     power_sum_solver,
     scalar_gauge_of,
 )
@@ -30,6 +32,8 @@ if TYPE_CHECKING:
 
 # Part of a motion along a load without limit, above which its power is infinite.
 _FREE = 1e-12
+# How much smaller than the smallest of its ellipsoids a surface may be.
+_MOST_SHRINKAGE = 1e60
 
 
 def thesis_exponents(terms: int) -> Floats:
@@ -87,6 +91,15 @@ class PowerSum(LimitSurface):
             )
         if not ((exponents > 0.0) & (exponents <= 1.0)).all():
             raise RangeError(f"exponents must lie in (0, 1], got {exponents.tolist()}")
+        forms = np.trace(matrices, axis1=1, axis2=2)[:, np.newaxis] / 3.0
+        with np.errstate(over="ignore"):
+            shrinkage = float(power_scale(exponents).load_factors(forms)[0] / np.sqrt(forms.max()))
+        if not shrinkage <= _MOST_SHRINKAGE:
+            raise RangeError(
+                f"exponents {exponents.tolist()} are too small: together they make the surface "
+                f"{shrinkage:.0e} times smaller than its ellipsoids, {_MOST_SHRINKAGE:.0e} is the "
+                "most that numbers hold"
+            )
         exponents.setflags(write=False)
         object.__setattr__(self, "matrices", matrices)
         object.__setattr__(self, "exponents", exponents)
@@ -148,6 +161,16 @@ class PowerSum(LimitSurface):
         weights = np.power(forms, exponents - 1.0, out=np.zeros_like(forms), where=forms > 0.0)
         gradient = np.einsum("km,kim->mi", 2.0 * exponents * weights, images)
         return np.asarray(gradient.reshape(array.shape))
+
+    def gradient_twist(self, wrench: ArrayLike) -> Floats:
+        """Direction of the gradient of H at the wrench itself; see `LimitSurface`."""
+        if is_norm(self.exponents):
+            return self.twist_of_wrench(wrench)
+        # Refuses what is no wrench, and what nothing limits.
+        self.twist_of_wrench(wrench)
+        gradient = self.gradient(np.asarray(wrench, dtype=np.float64) / self.scaling.wrench_unit)
+        length = np.linalg.norm(gradient, axis=-1, keepdims=True)
+        return np.asarray(gradient / length * self.scaling.twist_unit)
 
     @property
     def size(self) -> int:

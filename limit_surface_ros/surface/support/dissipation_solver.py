@@ -81,11 +81,14 @@ def dissipation_solver(roots: Floats) -> SupportSolver:
 
 
 def _in_round_frame(roots: Floats) -> SupportSolver:
-    """Return the solver in axes in which sum_k |R_k v|^2 is a sphere, if they are not too far."""
-    triangle = np.linalg.qr(roots.reshape(-1, 3))[1]
-    frame = np.linalg.inv(triangle)
-    if not np.linalg.cond(frame) < _CONDITION:
-        return _solver_of_norms(roots)
+    """Return the solver in units, and if they are not too skew in axes, in which D is round."""
+    rows = roots.reshape(-1, 3)
+    sizes = np.sqrt(np.square(rows).sum(axis=0))
+    # Those in which sum_k |R_k v|^2 is a sphere.
+    axes = np.linalg.inv(np.linalg.qr(rows / sizes)[1])
+    frame = np.diag(1.0 / sizes)
+    if np.linalg.cond(axes) < _CONDITION:
+        frame = frame @ axes
     return InFrame(frame, _solver_of_norms(roots @ frame))
 
 

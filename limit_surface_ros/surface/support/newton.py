@@ -24,11 +24,10 @@ if TYPE_CHECKING:
 
 # Newton's method stops after a step of this relative length: the next one would be its square.
 _LAST_STEP = 1e-8
-# It also stops where the sine of the angle between normal and gradient is below the first figure,
-# and where no step lowers the gauge any more; there that sine must be below the second.
+# It also stops where the sine of the angle between normal and gradient is below this, and where no
+# step lowers the gauge any more.
 _TARGET = 1e-14
-_ACCEPTED = 1e-9
-# A larger sine before a last step may come from a kink that drew Newton's method in.
+# Where it stops with a larger sine, a kink may have drawn it in.
 _PARALLEL = 1e-6
 _STEPS = 25
 _HALVINGS = 40
@@ -108,7 +107,7 @@ def plane_minimum(
         lengths = np.sqrt((moves * moves).sum(axis=0) / (points * points).sum(axis=0))
         last = lengths <= _LAST_STEP
         angles[todo] = sines
-        settled[todo] = last | (sines < _ACCEPTED)
+        settled[todo] = last | (sines <= _PARALLEL)
         result[:, todo] = points + np.where(last, moves, 0.0)
         # Just beyond a corner the curvature is large, and one step more makes the gradient
         # parallel; at a kink none does. Where kinks are rounded, their length alone tells.

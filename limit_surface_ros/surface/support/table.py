@@ -49,8 +49,6 @@ _OFF = 1e-12
 _NEAR = 1e-7
 _ROUNDING = 1e-15
 _MORE = 4.0
-# Part of a surface's size by which points of one sheet differ at most, found in two ways.
-_SAME = 1e-9
 # Error of a cell's polynomial, in parts of D, above which two sheets may meet in the cell: their
 # slopes differ there, and a slope within a cell is about a hundredth of that on the chart.
 _SMOOTH = 1e-6
@@ -95,13 +93,11 @@ class SupportTable:
         self._useful: Bools = np.ones(_CELLS**2, dtype=bool)
         self._last_step: Floats = np.full(_CELLS**2, _SHORT_STEP)
         middles = _normals(_grid((np.arange(2 * _CELLS) + 0.5) / _CELLS - 1.0))
-        found, certain = self.points(middles)
+        _, certain = self.points(middles)
         self._last_step = np.asarray(_of_cells(self._last_steps(middles)).min(axis=0))
         if convex:
             self._useful = np.asarray(_of_cells(certain).any(axis=0))
         else:
-            best = solver.solve(middles)[0]
-            certain &= np.abs(found - best).max(axis=0) <= _SAME * np.abs(best).max(axis=0)
             smooth = misfit <= _SMOOTH * np.abs(samples[0]).max()
             self._useful = np.asarray(_of_cells(certain).all(axis=0) & smooth)
 

@@ -20,9 +20,8 @@ if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.surface.gauges.gauge import FirstOrder, Vector
 
-# A table pays for a batch of so many times the vectors that are solved to make it: where a point
-# with the wanted normal is the answer for that alone, and where the table is tried as well.
-_PAYS_CONVEX, _PAYS = 1.3, 2.6
+# A table pays for a batch of so many times the vectors that are solved to make it.
+_PAYS = 1.3
 
 
 class Tabulated(SupportSolver):
@@ -70,5 +69,5 @@ class Tabulated(SupportSolver):
         """Make the table if it pays for so many normals at once."""
         if count == inf and not self._ahead:
             return
-        if self._table is None and count >= (_PAYS_CONVEX if self._convex else _PAYS) * SAMPLES:
+        if self._table is None and count >= _PAYS * SAMPLES:
             self._table = SupportTable(self._gauge, self._solver, convex=self._convex)
