@@ -20,7 +20,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from visualization_msgs.msg import Marker, MarkerArray
 
 from limit_surface_ros.files.surface_file import read_surface_model, write_surface_model
-from limit_surface_ros.nodes.surface_node import LimitSurfaceNode
+from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
 from limit_surface_ros.surface.kinds import KINDS
 from limit_surface_ros.tools import compare_surfaces
 from node_helpers import planar_twist, wrench_message
