@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 # Components larger than this, or vectors smaller, are refused: their products would overflow.
 LARGEST = 1.0e100
 SMALLEST = 1.0e-100
-# Most characters of a name that is repeated in a message.
-LONGEST_NAME = 200
 _REAL = (float, int)
 _INFINITY = float("inf")
 
@@ -33,15 +31,6 @@ _INFINITY = float("inf")
 def counted(count: int, noun: str) -> str:
     """Return a count with its noun, "1 pair" or "2 pairs", for messages."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
-def shortened(text: str, most: int = LONGEST_NAME) -> str:
-    """Return a text for a message, cut in its middle to `most` characters."""
-    if len(text) <= most:
-        return text
-    cut = f" ... {len(text)} characters ... "
-    begin = (most - len(cut) + 1) // 2
-    return text[:begin] + cut + text[len(text) - (most - len(cut) - begin) :]
 
 
 def as_floats(name: str, values: ArrayLike) -> Floats:

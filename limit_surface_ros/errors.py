@@ -13,19 +13,21 @@ from typing import ClassVar
 
 # Files of requirements/ that bring an extra into a clone, where that is not extras.txt.
 _GROUPS = {"peers": "bench"}
-# Characters of a message at most.
+# Characters at most of a message, and of a name that is repeated in one.
 _LONGEST = 2000
+LONGEST_NAME = 200
 
 
-def shortened(text: str, most: int = 200) -> str:
-    """Return a text for a message: whole, or its first and last characters and its length.
+def shortened(text: str, most: int = LONGEST_NAME) -> str:
+    """Return a text for a message, cut in its middle to `most` characters.
 
     What others chose, such as a name, may be a megabyte long, and stays in a log for ever.
     """
     if len(text) <= most:
         return text
-    kept = max(1, most // 2 - 20)
-    return f"{text[:kept]} ... {text[-kept:]} ({len(text)} characters)"
+    cut = f" ... {len(text)} characters ... "
+    begin = (most - len(cut) + 1) // 2
+    return text[:begin] + cut + text[len(text) - (most - len(cut) - begin) :]
 
 
 class LimitSurfaceError(Exception):

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from limit_surface_interfaces.msg import ErrorCode
 
-from limit_surface_ros.checks import shortened
-from limit_surface_ros.errors import LimitSurfaceError, SolverError
+from limit_surface_ros.errors import LimitSurfaceError, SolverError, shortened
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -21,8 +21,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from std_srvs.srv import Trigger
 
-from limit_surface_ros.checks import shortened
-from limit_surface_ros.errors import LimitSurfaceError, UnavailableError
+from limit_surface_ros.errors import LimitSurfaceError, UnavailableError, shortened
 from limit_surface_ros.nodes import answers
 from limit_surface_ros.nodes.diagnostics import Health, InputAge
 from limit_surface_ros.nodes.peers import LostMessages

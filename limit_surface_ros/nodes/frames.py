@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rclpy.clock import Clock, ClockType
 from rclpy.time import Time
 
-from limit_surface_ros.checks import shortened
 from limit_surface_ros.errors import (
     FrameError,
     TransformTooNewError,
     TransformTooOldError,
     UnavailableError,
+    shortened,
 )
 from limit_surface_ros.nodes.convert import nanoseconds
 from limit_surface_ros.nodes.endpoints import Waiting

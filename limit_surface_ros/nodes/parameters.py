@@ -16,8 +16,7 @@ from rcl_interfaces.msg import (
 from rclpy.exceptions import InvalidParameterTypeException, ParameterNotDeclaredException
 from rclpy.parameter import Parameter
 
-from limit_surface_ros.checks import shortened
-from limit_surface_ros.errors import LimitSurfaceError, RangeError, UnavailableError
+from limit_surface_ros.errors import LimitSurfaceError, RangeError, UnavailableError, shortened
 from limit_surface_ros.nodes import answers
 from limit_surface_ros.nodes.settings import Setting
 

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from limit_surface_ros.checks import shortened
-from limit_surface_ros.errors import RangeError
+from limit_surface_ros.errors import RangeError, shortened
 from limit_surface_ros.nodes import convert
 from limit_surface_ros.nodes.settings import Setting
 from limit_surface_ros.surface.frames import RigidTransform, out_of_plane

@@ -11,8 +11,7 @@ import textwrap
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from limit_surface_ros.checks import shortened
-from limit_surface_ros.errors import LimitSurfaceError, RangeError
+from limit_surface_ros.errors import LimitSurfaceError, RangeError, shortened
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.checks import shortened
-from limit_surface_ros.errors import FrameError, RangeError
+from limit_surface_ros.errors import FrameError, RangeError, shortened
 from limit_surface_ros.surface.frames import RigidTransform
 
 if TYPE_CHECKING:
