@@ -190,7 +190,9 @@ class DecayNode(ModelNode[DecayModel]):
             gate=self.values["outlier_gate"],
             span_factor=self.values["span_factor"],
         )
-        onset = Onset(message, self.models[""], self._now(), options, self.values["torque_length"])
+        onset = Onset(
+            message, self.host.models[""], self._now(), options, self.values["torque_length"]
+        )
         self.onset = onset
         self._publish_forecast()
         self._start_stream()
@@ -331,7 +333,7 @@ class DecayNode(ModelNode[DecayModel]):
 
     def list_models(self, _: ListDecays.Request, response: ListDecays.Response) -> None:
         """Answer `~/list_models`."""
-        response.models = self._list.infos(self.models.models)
+        response.models = self._list.infos(self.host.models)
 
     def _now(self) -> int:
         return int(self.get_clock().now().nanoseconds)
@@ -341,7 +343,7 @@ def describe_model(
     node: DecayNode, request: DescribeModel.Request, response: DescribeModel.Response
 ) -> None:
     """Answer `~/describe_model`."""
-    model = node.models[request.model]
+    model = node.host.models[request.model]
     response.name = model.name
     response.summary = model_info.decay_summary(model)
     response.fit = model_info.provenance(model)
@@ -351,7 +353,7 @@ async def predict_stop_of_a_body(
     node: DecayNode, request: PredictStop.Request, response: PredictStop.Response
 ) -> None:
     """Answer `~/predict_stop`."""
-    model, body = node.models[request.model], node.surfaces[request.surface]
+    model, body = node.host.models[request.model], node.surfaces.models[request.surface]
     surface, wrench, frame = await node.input.wrench(body, request.wrench)
     twist, load_factor = surface.twist_and_load_factor(wrench)
     factor = float(load_factor)

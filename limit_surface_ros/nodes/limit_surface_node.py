@@ -104,13 +104,13 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
 
     def list_models(self, _: ListModels.Request, response: ListModels.Response) -> None:
         """Answer `~/list_models`."""
-        response.models = self._list.infos(self.models.models, self.input.policy)
+        response.models = self._list.infos(self.host.models, self.input.policy)
 
     def describe_model(
         self, request: DescribeModel.Request, response: DescribeModel.Response
     ) -> None:
         """Answer `~/describe_model`."""
-        model = self.models[request.model]
+        model = self.host.models[request.model]
         response.name = model.name
         response.summary = model_info.surface_summary(model, self.input.policy.frame_of(model))
         response.fit = model_info.provenance(model)
@@ -119,11 +119,11 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
         return model_info.surface_info(model, is_default, self.input.policy.frame_of(model))
 
     def _present(self) -> tuple[SurfaceModel, LimitSurface, str]:
-        model, policy = self.models[""], self.input.policy
+        model, policy = self.host.models[""], self.input.policy
         return model, policy.surface_of(model), policy.frame_of(model)
 
     async def _predict(self, message: WrenchStamped) -> None:
-        model = self.models[""]
+        model = self.host.models[""]
         surface, wrench, frame = await self.input.wrench(model, message)
         self.markers.note(model, surface, wrench, frame)
         answer = TwistStamped()
@@ -134,7 +134,7 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
         self._twists.publish(answer)
 
     async def _require(self, message: TwistStamped) -> None:
-        model = self.models[""]
+        model = self.host.models[""]
         surface, twist, frame = await self.input.twist(model, message)
         answer = WrenchStamped()
         wrench = surface.wrench_of_twist(twist)
@@ -147,7 +147,7 @@ async def wrench_to_twist(
     node: LimitSurfaceNode, request: WrenchToTwist.Request, response: WrenchToTwist.Response
 ) -> None:
     """Answer `~/wrench_to_twist`."""
-    model = node.models[request.model]
+    model = node.host.models[request.model]
     surface, wrench, frame = await node.input.wrench(model, request.wrench)
     node.markers.note(model, surface, wrench, frame)
     twist, factor = surface.twist_and_load_factor(wrench)
@@ -164,7 +164,7 @@ async def twist_to_wrench(
     node: LimitSurfaceNode, request: TwistToWrench.Request, response: TwistToWrench.Response
 ) -> None:
     """Answer `~/twist_to_wrench`."""
-    model = node.models[request.model]
+    model = node.host.models[request.model]
     surface, twist, frame = await node.input.twist(model, request.twist)
     wrench = surface.wrench_of_twist(twist)
     convert.fill_wrench(response.wrench.wrench, wrench_at_origin(model, wrench))
@@ -178,7 +178,7 @@ async def wrenches_to_twists(
     response: WrenchesToTwists.Response,
 ) -> None:
     """Answer `~/wrenches_to_twists`."""
-    model, policy = node.models[request.model], node.input.policy
+    model, policy = node.host.models[request.model], node.input.policy
     rows = convert.rows_of("wrenches", request.wrenches, node.values["max_batch_rows"])
     there = await node.input.rows_matrix("wrench", model, request.header)
     back = rows_at_origin("twist", model)
@@ -203,7 +203,7 @@ async def twists_to_wrenches(
     response: TwistsToWrenches.Response,
 ) -> None:
     """Answer `~/twists_to_wrenches`."""
-    model, policy = node.models[request.model], node.input.policy
+    model, policy = node.host.models[request.model], node.input.policy
     rows = convert.rows_of("twists", request.twists, node.values["max_batch_rows"])
     there = await node.input.rows_matrix("twist", model, request.header)
     back = rows_at_origin("wrench", model)
@@ -227,7 +227,7 @@ async def push_at_a_point(
     node: LimitSurfaceNode, request: Push.Request, response: Push.Response
 ) -> None:
     """Answer `~/push`."""
-    model, policy = node.models[request.model], node.input.policy
+    model, policy = node.host.models[request.model], node.input.policy
     contact = await node.input.contact(model, request)
     pushed = push(policy.surface_of(model), *contact)
     convert.fill_twist(response.twist.twist, twist_at_origin(model, pushed.twist))

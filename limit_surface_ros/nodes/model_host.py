@@ -94,10 +94,6 @@ class ModelHost(Generic[Model]):
         self._read_last: ModelSet[Model] | None = None
         parameters.on_change(self.names, self._prepare, as_a_set=True)
 
-    def __getitem__(self, name: str) -> Model:
-        """Return a model; an empty name is the default model's."""
-        return self.models[name]
-
     @property
     def summary(self) -> str:
         """What is loaded, for people."""

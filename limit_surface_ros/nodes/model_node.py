@@ -37,7 +37,7 @@ class ModelNode(Node, Generic[Model]):
 
     Attributes:
         values: Its parameters.
-        models: Its models.
+        host: Its models.
         health: What it has seen.
         endpoints: Its services and topics.
 
@@ -67,22 +67,22 @@ class ModelNode(Node, Generic[Model]):
         self.health = diagnostics.Health()
         try:
             self.values = Parameters(self, [*settings, *COMMON_SETTINGS])
-            self.models = ModelHost(self.values, read, self.get_logger().warning, prepare=prepare)
+            self.host = ModelHost(self.values, read, self.get_logger().warning, prepare=prepare)
         except Exception:
             self.destroy_node()
             raise
-        self._hosts.append(self.models)
+        self._hosts.append(self.host)
         peers = Peers(self)
         self.endpoints = Endpoints(self, self.health, peers)
         self.endpoints.serve_trigger("reload", self._reload, "the old models keep serving")
         self._diagnostics = diagnostics.Diagnostics(
             self, self.values, self.health, peers, self.describe
         )
-        self.get_logger().info(self.models.summary)
+        self.get_logger().info(self.host.summary)
 
     def describe(self) -> dict[str, str]:
         """Return what diagnostics say beside counts and times."""
-        return {"model": self.models.models.default, "models": str(len(self.models.models))}
+        return {"model": self.host.models.default, "models": str(len(self.host.models))}
 
     def add_models(
         self,

@@ -50,7 +50,7 @@ async def simulate_one(
     node: Any, request: SimulatePush.Request, response: SimulatePush.Response
 ) -> None:
     """Answer `~/simulate_push`."""
-    model = node.models[request.model]
+    model = node.host.models[request.model]
     tips, stamps = _tips(request)
     outline = outline_of(model, request)
     run = simulate_push(
@@ -96,7 +96,7 @@ async def simulate_many(
     node: Any, request: SimulatePushes.Request, response: SimulatePushes.Response
 ) -> None:
     """Answer `~/simulate_pushes`, in steps between which others have their turns."""
-    model = node.models[request.model]
+    model = node.host.models[request.model]
     poses = _rows("poses", request.poses, 3)
     starts, ends = (_rows(name, getattr(request, name), 2) for name in ("tip_starts", "tip_ends"))
     if not len(poses) == len(starts) == len(ends):

@@ -68,7 +68,7 @@ async def evaluate(
         response.values = convert.flat_of(onset.response.x(times))
         response.bounds = convert.flat_of(onset.response.bounds(times))
     else:
-        model = node.models[request.model]
+        model = node.host.models[request.model]
         flat_values, values = empty_rows(len(times), 1)
         flat_bounds, bounds = empty_rows(len(times), 1)
 
@@ -87,7 +87,7 @@ def time_to_level(node: Any, request: TimeToLevel.Request, response: TimeToLevel
     if request.running:
         response.time = running_onset(node, request.model).response.x.time_to_level(request.level)
     else:
-        response.time = node.models[request.model].sum.time_to_level(request.level)
+        response.time = node.host.models[request.model].sum.time_to_level(request.level)
     response.reached = bool(np.isfinite(response.time))
 
 

@@ -91,7 +91,7 @@ class SurfaceMarkers:
         if not watchers:
             return
         if self._load is not None and all(
-            model is not self._load.model for model in self._node.models.models
+            model is not self._load.model for model in self._node.host.models
         ):
             # What a model answered that is no longer served says nothing about the present ones.
             self._load = None

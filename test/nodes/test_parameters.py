@@ -113,7 +113,7 @@ def test_files_and_default_change_together_in_any_order_of_one_request(
     given = [Parameter(name, value=values[name]).to_parameter_msg() for name in names]
     answer = load(SetParameters.Request(parameters=given))
     assert [result.successful for result in answer.results] == [True, True], answer.results
-    assert node.models.models.default == "crate"
+    assert node.host.models.default == "crate"
     others = [Parameter("input_timeout", value=-1.0), Parameter("normal_force", value=2.0)]
     given = [parameter.to_parameter_msg() for parameter in others]
     answer = load(SetParameters.Request(parameters=given))

@@ -86,7 +86,7 @@ def entered_by_a_call(
     client = client_node.create_client(service, name)
     while not client.service_is_ready():
         executor.spin_once(timeout_sec=0.05)
-    while not node.models.prepared:
+    while not node.host.prepared:
         executor.spin_once(timeout_sec=0.05)
     try:
         for _ in range(3):
