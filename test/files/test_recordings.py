@@ -138,8 +138,10 @@ def test_a_bias_is_found_at_rests_also_where_the_pusher_leans(plan):
     assert found.tare.mean[5] == pytest.approx(BIAS[2], abs=5e-4)
     assert found.tare.mean[2] == pytest.approx(9.0, abs=0.01)
     assert together(found.pairs) < 1.5
-    simulated, _ = pushes_of(bias=BIAS, **FINE, **plan)
-    left = find_pushes(simulated.recording, None, Corrections(tare=False))
+
+
+def test_a_bias_is_left_if_that_is_asked_for():
+    _, left = pushes_of(0, Corrections(tare=False), bias=BIAS, **FINE)
     assert left.tare is None
     assert together(left.pairs) > 3.0
 
@@ -153,6 +155,14 @@ def test_a_bias_that_drifts_is_followed():
 def test_without_rests_no_bias_is_made_up():
     _, found = pushes_of(bias=BIAS, pushes=2, resting=0.5, leaning=2.0, **FINE)
     assert found.tare is None
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_loads_that_come_and_go_between_pushes_are_no_bias(seed):
+    """Between these pushes the load is at zero for a twentieth of a second alone."""
+    _, found = pushes_of(seed, pushes=8, resting=0.3, moving=6.0, **FINE)
+    assert found.tare is None
+    assert together(found.pairs) < 1.0
 
 
 def test_measured_twists_are_averaged_over_windows():

@@ -27,6 +27,10 @@ _FEWEST_RESTS, _SHARE = 3, 0.15
 # many seconds.
 _DRIFTS, _EVERY = 3.0, 5.0
 _MOST_PIECES = 3000
+# The lower quartile of the size of a difference of two samples of unit noise.
+_QUARTER = 0.4506
+# Slow noise of a sensor is no more than so many times that which its fine noise leaves of a level.
+_SLOWEST = 5.0
 # Rests shorter than this [s], at both ends less a margin, are none.
 _MARGIN = 0.02
 
@@ -72,44 +76,90 @@ def find_tare(
         The bias, or None where no level recurs.
     """
     noise = np.array([estimate_noise(times, column) for column in wrenches.T])
-    middles, levels, owners, counts = _pieces(times, wrenches, rests)
-    if len(middles) < 2:
+    pieces = _pieces(times, wrenches, rests)
+    count = len(pieces.middles)
+    if count < 2:
         return None
-    if len(middles) > _MOST_PIECES:
-        some = np.linspace(0, len(middles) - 1, _MOST_PIECES).astype(np.intp)
-        middles, levels, owners = middles[some], levels[some], owners[some]
-    near = owners[1:] == owners[:-1]
-    steps = np.abs(np.diff(levels, axis=0))[near]
-    slow = 1.4826 * np.median(steps, axis=0) / np.sqrt(2.0) if len(steps) else np.zeros(6)
-    # Of levels, those of a noise slower than the pieces included.
-    deviation = np.maximum(noise / np.sqrt(max(counts, 1.0)), slow)
-    size = np.abs(levels[:, parts]).max()
+    if count > _MOST_PIECES:
+        pieces = pieces.take(np.linspace(0, count - 1, _MOST_PIECES).astype(np.intp))
+    near = pieces.owners[1:] == pieces.owners[:-1]
+    steps = _steps(pieces)[near]
+    # Of levels, those of a noise slower than the pieces included. The steps of loads that rise
+    # and fall are among them: the smallest quarter is noise, if it is not far beyond that.
+    fine = noise / np.sqrt(max(pieces.usual, 1.0))
+    slow = np.quantile(steps, 0.25, axis=0) / _QUARTER if len(steps) else fine
+    deviation = np.clip(slow, fine, _SLOWEST * fine)
+    size = np.abs(pieces.levels[:, parts]).max()
     tolerance = np.maximum(_DEVIATIONS * deviation[parts], 1e-9 * max(size, 1e-300))
-    group = _largest_group(middles, levels[:, parts], tolerance)
-    told = len(set(owners[group].tolist()))
-    if told < _FEWEST_RESTS or len(group) < _SHARE * len(middles):
+    count = len(pieces.middles)
+    # Halves of a piece have twice the variance of the whole, and their difference twice that.
+    flat = (np.abs(pieces.changes[:, parts]) <= 2.0 * tolerance).all(axis=1)
+    # One flat piece may be the turn of a load: its neighbour must be of the same level, too.
+    with_next = near & flat[1:] & flat[:-1] & (_steps(pieces)[:, parts] <= tolerance).all(axis=1)
+    held = np.append(with_next, False) | np.insert(with_next, 0, False)
+    pieces = pieces.take(np.flatnonzero(held))
+    if len(pieces.middles) < _FEWEST_RESTS:
         return None
-    return _of_group(middles[group], levels[group], told, parts, tolerance)
+    group = pieces.take(_largest_group(pieces.middles, pieces.levels[:, parts], tolerance))
+    told = len(set(group.owners.tolist()))
+    if told < _FEWEST_RESTS or len(group.middles) < _SHARE * count:
+        return None
+    return _of_group(group, told, parts, tolerance)
 
 
-def _pieces(
-    times: Floats, wrenches: Floats, rests: list[tuple[float, float]]
-) -> tuple[Floats, Floats, Floats, float]:
-    """Return the middle, the level and the rest of each piece, and how many samples most hold."""
-    middles, levels, owners, counts = [], [], [], []
+@dataclass(frozen=True, eq=False)
+class _Pieces:
+    """Pieces of rests: when, their levels, how these change inside, and the rest of each."""
+
+    middles: Floats
+    levels: Floats
+    changes: Floats
+    owners: Places
+    usual: float
+
+    def take(self, which: Places) -> _Pieces:
+        return _Pieces(
+            self.middles[which],
+            self.levels[which],
+            self.changes[which],
+            self.owners[which],
+            self.usual,
+        )
+
+
+def _steps(pieces: _Pieces) -> Floats:
+    """Return how far each level is from that before, shape (n - 1, 6)."""
+    return np.asarray(np.abs(np.diff(pieces.levels, axis=0)))
+
+
+def _pieces(times: Floats, wrenches: Floats, rests: list[tuple[float, float]]) -> _Pieces:
+    """Cut rests into pieces."""
+    middles, levels, changes, owners, counts = [], [], [], [], []
     for owner, (start, end) in enumerate(rests):
         count = int((end - start - 2.0 * _MARGIN) / _PIECE)
         bounds = start + _MARGIN + _PIECE * np.arange(count + 1)
         places = np.searchsorted(times, bounds)
         for k in range(count):
             part = wrenches[places[k] : places[k + 1]]
+            half = len(part) // 2
             if len(part):
                 middles.append(0.5 * (bounds[k] + bounds[k + 1]))
                 levels.append(part.mean(axis=0))
+                ends = (
+                    part[len(part) - half :].mean(axis=0) - part[:half].mean(axis=0)
+                    if half
+                    else 0.0
+                )
+                changes.append(np.zeros(6) + ends)
                 owners.append(owner)
                 counts.append(len(part))
-    usual = float(np.median(counts)) if counts else 0.0
-    return np.array(middles), np.array(levels).reshape(-1, 6), np.array(owners), usual
+    return _Pieces(
+        np.array(middles),
+        np.array(levels).reshape(-1, 6),
+        np.array(changes).reshape(-1, 6),
+        np.array(owners, dtype=np.intp),
+        float(np.median(counts)) if counts else 0.0,
+    )
 
 
 def _largest_group(middles: Floats, levels: Floats, tolerance: Floats) -> Places:
@@ -133,10 +183,12 @@ def _largest_group(middles: Floats, levels: Floats, tolerance: Floats) -> Places
     return np.flatnonzero(roots == names[int(np.argmax(counts))])
 
 
-def _of_group(
-    middles: Floats, levels: Floats, told: int, parts: list[int], tolerance: Floats
-) -> Tare:
-    """Return the bias of a group: one level, or one every few seconds if it drifts."""
+def _of_group(group: _Pieces, told: int, parts: list[int], tolerance: Floats) -> Tare | None:
+    """Return the bias of a group: one level, or one every few seconds if it drifts.
+
+    Levels that are linked but differ within so short a time are loads that come and go: None.
+    """
+    middles, levels = group.middles, group.levels
     spread = np.ptp(levels[:, parts], axis=0)
     if (spread <= _DRIFTS * tolerance).all():
         level = np.median(levels, axis=0)
@@ -145,6 +197,8 @@ def _of_group(
     places, values = [], []
     for cell in np.unique(cells):
         part = cells == cell
+        if (np.ptp(levels[part][:, parts], axis=0) > _DRIFTS * tolerance).any():
+            return None
         places.append(float(np.median(middles[part])))
         values.append(np.median(levels[part], axis=0))
     table = np.array(values)
