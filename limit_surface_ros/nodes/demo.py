@@ -28,9 +28,11 @@ from limit_surface_ros.nodes import convert, demo_decay, demo_push
 from limit_surface_ros.nodes.service_client import ServiceClient
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
 TOLERANCE = 1e-6
+# How long the nodes may take to start and to answer, on the busiest machine [s].
+PATIENCE = 300.0
 ACROSS = 0.04  # [m] from the reference point to the turning point of the facet's motion
 HEADING = (
     f"{'load':<28}{'fx [N]':>9}{'fy [N]':>9}{'tau [Nm]':>10}{'factor':>9}  {'body':<8}"
@@ -118,7 +120,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.parse_args(argv)
     namespace = f"/demo_{os.getpid()}"
     try:
-        with _running_nodes(namespace), ServiceClient("demo") as client:
+        with (
+            _running_nodes(namespace) as alive,
+            ServiceClient("demo", PATIENCE, alive) as client,
+        ):
             demo = Demo(client, namespace)
             agrees = _show(demo)
             push = [3.0 * part for part in demo.limit_load([1.0, 0.0, 0.0])]
@@ -163,18 +168,21 @@ def _show(demo: Demo) -> bool:
 
 
 @contextlib.contextmanager
-def _running_nodes(namespace: str) -> Iterator[None]:
-    """Run the nodes in a process of their own, and end it as Ctrl-C would."""
+def _running_nodes(namespace: str) -> Iterator[Callable[[], bool]]:
+    """Run the nodes in a process of their own, and end it as Ctrl-C would.
+
+    Gives a function that tells whether they still run.
+    """
     command = [sys.executable, "-m", "limit_surface_ros.nodes.force_motion_nodes"]
     process = subprocess.Popen([*command, "--ros-args", "-r", f"__ns:={namespace}"])
     try:
-        yield
+        yield lambda: process.poll() is None
         if process.poll() is not None:
             raise RuntimeError(f"the nodes ended early with exit code {process.returncode}")
     finally:
         process.send_signal(signal.SIGINT)
         try:
-            code = process.wait(timeout=10.0)
+            code = process.wait(timeout=PATIENCE)
         except subprocess.TimeoutExpired:
             process.kill()
             code = process.wait()

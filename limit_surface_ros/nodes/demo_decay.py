@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,7 +25,6 @@ MODEL = "exponential"
 TOLERANCE = 1e-6
 ROWS = 8
 AFTER = 1.25  # of the time of the stop: how long the wrench is watched
-PATIENCE = 20.0  # [s]
 HEADING = f"{'t [s]':>7}{'fx [N]':>10}{'fy [N]':>10}{'tau [Nm]':>10}{'factor':>9}  body"
 
 
@@ -39,6 +39,7 @@ class FallingWrench:
 
     def __init__(self, client: ServiceClient, prefix: str, load: WrenchStamped) -> None:
         """Subscribe, and give the onset once the node hears and is heard."""
+        self._client = client
         self._rows: list[tuple[int, tuple[float, float, float]]] = []
         self._changed = threading.Condition()
         node = client.node
@@ -53,9 +54,9 @@ class FallingWrench:
         self.start = nanoseconds(load.header.stamp)
         onsets.publish(load)
 
-    def until(self, time: float) -> tuple[Any, Any]:
+    def until(self, latest: float) -> tuple[Any, Any]:
         """Wait until the wrench of a time [s] is there; return all times and planar wrenches."""
-        self._wait(lambda: bool(self._rows) and self._seconds(self._rows[-1][0]) >= time)
+        self._wait(lambda: bool(self._rows) and self._seconds(self._rows[-1][0]) >= latest)
         with self._changed:
             stamps, loads = zip(*self._rows, strict=True)
         return np.array([self._seconds(stamp) for stamp in stamps]), np.array(loads)
@@ -71,12 +72,13 @@ class FallingWrench:
             self._changed.notify_all()
 
     def _wait(self, condition: Any) -> None:
-        for _ in range(int(PATIENCE / 0.05)):
+        end = time.monotonic() + self._client.patience
+        while time.monotonic() < end and self._client.alive():
             with self._changed:
                 if condition():
                     return
                 self._changed.wait(0.05)
-        raise TimeoutError(f"the decay node sent nothing for {PATIENCE:g} s")
+        raise TimeoutError("the decay node sends nothing")
 
 
 def show(client: ServiceClient, namespace: str, frame: str, load: Sequence[float]) -> bool:

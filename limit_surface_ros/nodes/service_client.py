@@ -11,6 +11,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from types import TracebackType
 
 
@@ -26,10 +27,16 @@ class ServiceClient:
 
     Args:
         name: Name of the node.
+        patience: How long a call waits for a service and for its answer, if not told [s].
+        alive: Tells whether whoever serves still runs; nobody is waited for who does not.
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(
+        self, name: str, patience: float = 10.0, alive: Callable[[], bool] = lambda: True
+    ) -> None:
         """Start the node and its thread."""
+        self.patience = patience
+        self.alive = alive
         self._context = rclpy.Context()
         rclpy.init(context=self._context)
         self.node = rclpy.create_node(name, context=self._context)
@@ -55,20 +62,25 @@ class ServiceClient:
         self.node.destroy_node()
         self._context.try_shutdown()
 
-    def call(self, service_type: Any, name: str, request: Any, timeout: float = 10.0) -> Any:
+    def call(
+        self, service_type: Any, name: str, request: Any, timeout: float | None = None
+    ) -> Any:
         """Call a service and return its answer.
 
         Raises:
             TimeoutError: There is no such service, or it does not answer in time [s].
         """
+        timeout = self.patience if timeout is None else timeout
+        end = time.monotonic() + timeout
         client = self._clients.get(name)
         if client is None:
             client = self.node.create_client(service_type, name)
-            if not client.wait_for_service(timeout_sec=timeout):
-                raise TimeoutError(f"there is no service {name} after {timeout:g} s")
+            while not client.wait_for_service(timeout_sec=min(timeout, AGAIN)):
+                if time.monotonic() > end or not self.alive():
+                    raise TimeoutError(f"there is no service {name} after {timeout:g} s")
             self._clients[name] = client
-        end = time.monotonic() + timeout
-        while (left := end - time.monotonic()) > 0.0:
+            end = time.monotonic() + timeout
+        while (left := end - time.monotonic()) > 0.0 and self.alive():
             answered = threading.Event()
             future = client.call_async(request)
             future.add_done_callback(lambda _, event=answered: event.set())

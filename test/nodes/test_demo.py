@@ -42,3 +42,15 @@ def test_the_demonstration_pushes_the_body_along_a_path(output):
     assert rows[0] == "does not push"
     assert {"sticks", "slides left", "slides right"} & set(rows)
     assert "it ends where the batch of pushes says" in output
+
+
+def test_nobody_is_waited_for_who_has_ended():
+    from limit_surface_interfaces.srv import ListModels
+
+    from limit_surface_ros.nodes.service_client import ServiceClient
+
+    with (
+        ServiceClient("asks", patience=3600.0, alive=lambda: False) as client,
+        pytest.raises(TimeoutError, match="there is no service /absent"),
+    ):
+        client.call(ListModels, "/absent", ListModels.Request())
