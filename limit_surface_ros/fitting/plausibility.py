@@ -94,7 +94,11 @@ def doubts_of_pairs(pairs: Pairs, characteristic_length: float | None = None) ->
         characteristic_length: What is stated of the body [m].
 
     Examples:
-        >>> pushes = random_motions(limit_surface, 50)
+        >>> from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+        >>> from limit_surface_ros.surface.pairs import Pairs
+        >>> from limit_surface_ros.surface.sampling import random_motions
+        >>> feet = [[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]]
+        >>> pushes = random_motions(PointContacts(feet, [1.4, 1.4, 1.4]), 50)
         >>> doubts_of_pairs(pushes)
         []
         >>> in_millimetres = Pairs(pushes.wrenches * [1, 1, 1000], pushes.twists)

@@ -125,6 +125,19 @@ def find_pushes(
 
     Raises:
         DataError: There are fewer than two motions or wrenches, or no part is a quasi-static push.
+
+    Examples:
+        >>> from limit_surface_ros.files.recordings.simulation import (
+        ...     RecordingPlan,
+        ...     simulate_recording,
+        ... )
+        >>> from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+        >>> feet = [[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]]
+        >>> plan = RecordingPlan(pushes=12, pose_noise=1e-4, yaw_noise=1e-3, delay=0.1)
+        >>> recording = simulate_recording(PointContacts(feet, [1.4, 1.4, 1.4]), plan).recording
+        >>> found = find_pushes(recording)
+        >>> len(found.pairs) > 40, round(found.clock_offset.delay, 1)
+        (True, 0.1)
     """
     rules, how = selection or Selection(), corrections or Corrections()
     for what, count in (
