@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cache, cached_property
 from math import inf, sqrt
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
@@ -59,6 +59,11 @@ class FileArray:
     key: str
     shape: tuple[int | str | None, ...]
     at_least: float = -inf
+
+
+@cache
+def _field_names(kind: type[LimitSurface]) -> tuple[str, ...]:
+    return tuple(each.name for each in fields(kind))
 
 
 class LimitSurface(ABC):
@@ -130,7 +135,7 @@ class LimitSurface(ABC):
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what defines the surface: tables made on the way stay out of pickles."""
-        return {each.name: self.__dict__[each.name] for each in fields(self)}
+        return {name: self.__dict__[name] for name in _field_names(type(self))}
 
     def scaled(self: Self, factor: float) -> Self:
         """Return the surface with every wrench on it multiplied by `factor`.
