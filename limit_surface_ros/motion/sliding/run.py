@@ -25,11 +25,15 @@ from limit_surface_ros.motion.sliding.rest import (
 from limit_surface_ros.motion.sliding.result import Recorder, Slide
 
 if TYPE_CHECKING:
+    from collections.abc import Generator
+
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.motion.sliding.body import SlidingBody
     from limit_surface_ros.motion.sliding.equations import Motion
     from limit_surface_ros.motion.sliding.load import Load
 
+# Steps between two pauses, some 4 ms.
+STEPS_AT_ONCE = 40
 # Part of a leg's greatest energy norm below which it ends along its last direction, and where a
 # load is about to reverse it.
 _END, _REVERSED = 1e-5, 1e-9
@@ -65,8 +69,8 @@ class Run:
         self._path = Recorder()
         self._rests: list[tuple[float, float]] = []
 
-    def run(self, twist: Floats, pose: Floats) -> Slide:
-        """Slide from a twist and a pose to rest."""
+    def stages(self, twist: Floats, pose: Floats) -> Generator[None, None, Slide]:
+        """Slide from a twist and a pose to rest, with a pause every `STEPS_AT_ONCE` steps."""
         x, y, heading = pose.tolist()
         state = State(0.0, (x, y, heading), tuple(twist.tolist()))
         self._speed = max(self._body.energy_norm(twist), self._speed_by_load(heading))
@@ -90,7 +94,7 @@ class Run:
                 if started is None:
                     break
                 state = started
-            state, direction = self._slide_to_rest(state)
+            state, direction = yield from self._slide_to_rest(state)
             moves = False
         total = energy + abs(state.load_work) + state.friction_work
         residual = energy + state.load_work - state.friction_work
@@ -202,7 +206,7 @@ class Run:
         if not time <= self._horizon:
             raise SolverError(f"the body still slides at the horizon of {self._horizon:g} s")
 
-    def _slide_to_rest(self, state: State) -> tuple[State, Floats]:
+    def _slide_to_rest(self, state: State) -> Generator[None, None, tuple[State, Floats]]:
         """Return the state at the next rest, and the direction in which it was reached."""
         peak, below = 0.0, _END
         held: tuple[int, ...] = ()
@@ -217,6 +221,8 @@ class Run:
             while True:
                 stepper.step()
                 self._steps -= 1
+                if self._steps % STEPS_AT_ONCE == 0:
+                    yield
                 if self._steps < 0:
                     raise SolverError(
                         "the slide took too many steps; it reached "

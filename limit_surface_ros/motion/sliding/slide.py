@@ -10,20 +10,24 @@ weight forwards, which is not considered. See S. Goyal, A. Ruina and J. Papadopo
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
-from limit_surface_ros.checks import as_floats, as_positive, as_vectors
+from limit_surface_ros.checks import as_positive, as_vectors
 from limit_surface_ros.errors import RangeError, ShapeError, SolverError, UnstableError
 from limit_surface_ros.motion.sliding.body import SlidingBody
 from limit_surface_ros.motion.sliding.run import Run
 
 if TYPE_CHECKING:
+    from collections.abc import Generator
+
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.motion.sliding.inertia import Inertia
     from limit_surface_ros.motion.sliding.load import Load
     from limit_surface_ros.motion.sliding.result import Slide
     from limit_surface_ros.surface.base import LimitSurface
+
+Result = TypeVar("Result")
 
 # Error of one step, in parts of the slide: of a shoved body, and of one under a load.
 TOLERANCE, LOAD_TOLERANCE = 1e-8, 1e-9
@@ -94,6 +98,33 @@ def slide_body(
     most_steps: int = MOST_STEPS,
 ) -> Slide:
     """Return how a body that is prepared slides to rest; see `slide`."""
+    return finish(
+        slide_stages(
+            body,
+            twist,
+            load,
+            pose,
+            horizon=horizon,
+            tolerance=tolerance,
+            most_steps=most_steps,
+        )
+    )
+
+
+def slide_stages(
+    body: SlidingBody,
+    twist: ArrayLike,
+    load: Load | None = None,
+    pose: ArrayLike = (0.0, 0.0, 0.0),
+    *,
+    horizon: float = math.inf,
+    tolerance: float | None = None,
+    most_steps: int = MOST_STEPS,
+) -> Generator[None, None, Slide]:
+    """Return a generator that slides a body in stages of some milliseconds; see `slide`.
+
+    What a generator returns is the value of the StopIteration that ends it.
+    """
     start, place = as_vectors("twist", twist), as_vectors("pose", pose)
     for name, array in (("twist", start), ("pose", place)):
         if array.shape != (3,):
@@ -102,9 +133,18 @@ def slide_body(
         raise RangeError(f"horizon must be above 0, got {horizon}")
     if tolerance is None:
         tolerance = TOLERANCE if load is None else LOAD_TOLERANCE
-    return Run(body, load, horizon, as_positive("tolerance", tolerance), most_steps).run(
-        start, place
-    )
+    tolerance = as_positive("tolerance", tolerance)
+    return Run(body, load, horizon, tolerance, most_steps).stages(start, place)
+
+
+def finish(stages: Generator[None, None, Result]) -> Result:
+    """Run a generator to its end without a pause, and return what it returns."""
+    while True:
+        try:
+            next(stages)
+        except StopIteration as end:
+            result: Result = end.value
+            return result
 
 
 def stop_bracket(
@@ -125,25 +165,51 @@ def stop_bracket(
         body: The body.
         twist: As in `slide`.
         load: As in `slide`.
-        max_error: Bound of |x - response|, in the unit of x.
+        max_error: Bound of |x - response|, in the unit of x; infinity leaves all open.
         pose: As in `slide`.
         horizon: As in `slide`; what does not rest within it rests at infinity.
 
     Raises:
-        RangeError: The error is negative.
+        RangeError: The error is negative or not a number.
     """
-    error = float(as_floats("max_error", max_error))
-    if error < 0.0:
+    return finish(bracket_stages(body, twist, load, max_error, pose, horizon=horizon))
+
+
+def bracket_stages(
+    body: SlidingBody,
+    twist: ArrayLike,
+    load: Load,
+    max_error: float,
+    pose: ArrayLike = (0.0, 0.0, 0.0),
+    *,
+    horizon: float = math.inf,
+) -> Generator[None, None, tuple[float, float]]:
+    """Return a generator that finds `stop_bracket` in stages of some milliseconds."""
+    error = float(max_error)
+    if not error >= 0.0:
         raise RangeError(f"max_error must be at least 0, got {error:g}")
+    return _bracket(body, twist, load, error, pose, horizon)
+
+
+def _bracket(
+    body: SlidingBody,
+    twist: ArrayLike,
+    load: Load,
+    error: float,
+    pose: ArrayLike,
+    horizon: float,
+) -> Generator[None, None, tuple[float, float]]:
     times = []
+    start = load.decay.start
     for sign in (-1.0, 1.0):
-        shift = math.copysign(error, sign * load.decay.start)
-        if sign < 0.0 and error >= abs(load.decay.start):
-            times.append(slide_body(body, twist, None, pose, horizon=horizon).time)
-            continue
+        # An error as large as the onset may leave nothing of the load.
+        less = sign < 0.0 and error >= abs(start)
         try:
-            shifted = load.shifted(shift)
-            times.append(slide_body(body, twist, shifted, pose, horizon=horizon).time)
+            if error == math.inf and sign > 0.0:
+                raise UnstableError("any load is within the error")
+            changed = None if less else load.shifted(math.copysign(error, sign * start))
+            found = yield from slide_stages(body, twist, changed, pose, horizon=horizon)
+            times.append(found.time)
         except (UnstableError, SolverError):
             times.append(math.inf)
     return min(times), max(times)
