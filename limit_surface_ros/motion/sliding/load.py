@@ -42,6 +42,7 @@ class Load:
     decay: ExponentialSum
     in_world: bool = False
     _terms: list[tuple[complex, complex]] = field(init=False, repr=False)
+    _waves: list[tuple[float, float, float, float]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the wrench and the decay model."""
@@ -59,7 +60,9 @@ class Load:
             zip(self.decay.rates.tolist(), (self.decay.coefficients / start).tolist(), strict=True)
         )
         object.__setattr__(self, "wrench", wrench)
+        waves = [(rate.real, rate.imag, c.real, c.imag) for rate, c in terms]
         object.__setattr__(self, "_terms", terms)
+        object.__setattr__(self, "_waves", waves)
 
     def shifted(self, error: float) -> Load:
         """Return the load under x(t) + error, scaled to the x(0) of the model as it is.
@@ -81,7 +84,15 @@ class Load:
 
     def fraction(self, time: float) -> float:
         """Return x(t) / x(0) at a time [s]."""
-        return sum((c * exp(rate * time)).real for rate, c in self._terms)
+        value = 0.0
+        for damping, frequency, real, imaginary in self._waves:
+            size = math.exp(damping * time)
+            if frequency:
+                angle = frequency * time
+                value += size * (real * math.cos(angle) - imaginary * math.sin(angle))
+            else:
+                value += size * real
+        return value
 
     def mean_fraction(self, start: float, end: float) -> float:
         """Return the mean of x(t) / x(0) between two times [s]."""
