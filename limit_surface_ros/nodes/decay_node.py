@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The `decay` node: how a load dies away after its onset, and when sliding stops."""
+"""The `decay` node: how a load dies away after its onset, and what slides and slips by it."""
 
 from __future__ import annotations
 
@@ -8,32 +8,31 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from geometry_msgs.msg import Vector3Stamped, WrenchStamped
-from limit_surface_interfaces.msg import DecayForecast, TimeLeft
-from limit_surface_interfaces.srv import DescribeModel, ListDecays, PredictStop
+from limit_surface_interfaces.msg import DecayForecast, NormalForce, TimeLeft
+from limit_surface_interfaces.srv import DescribeModel, ListDecays
 
 from limit_surface_ros.decay.estimation import EstimationOptions
-from limit_surface_ros.decay.response import onset_value
 from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.decay_file import DecayModel, read_decay_model
 from limit_surface_ros.files.surface_file import read_surface_model
-from limit_surface_ros.motion.holding import holds_from
 from limit_surface_ros.nodes import (
     convert,
     frames,
     model_info,
     planar_input,
     running_decay,
+    sliding_services,
     spin,
 )
 from limit_surface_ros.nodes.batches import Batches
 from limit_surface_ros.nodes.convert import SECOND, nanoseconds
-from limit_surface_ros.nodes.endpoints import Service
+from limit_surface_ros.nodes.endpoints import STREAM_DEPTH, Service
 from limit_surface_ros.nodes.model_host import model_settings
 from limit_surface_ros.nodes.model_info import ModelList
 from limit_surface_ros.nodes.model_node import COMMON_SETTINGS, ModelNode
 from limit_surface_ros.nodes.onset import Onset
 from limit_surface_ros.nodes.onset_stream import OnsetStream
-from limit_surface_ros.nodes.planar_input import PlanarInput, prepare_surface, twist_at_origin
+from limit_surface_ros.nodes.planar_input import PlanarInput, prepare_surface
 from limit_surface_ros.nodes.settings import Setting
 
 if TYPE_CHECKING:
@@ -48,7 +47,7 @@ VERDICT_EVERY = 10
 SETTINGS = (
     *model_settings("config/decay", "decay models"),
     *model_settings(
-        "config/models", "limit surfaces for predict_stop", "surface_files", "default_surface"
+        "config/models", "limit surfaces of bodies and grips", "surface_files", "default_surface"
     ),
     Setting("rate", 100.0, "Wrenches and values a second [Hz]", minimum=1e-3, maximum=1e4),
     Setting("horizon", 10.0, "How far forecasts reach [s]", minimum=1e-6, maximum=1e6),
@@ -103,6 +102,7 @@ SETTINGS = (
         maximum=1e9,
     ),
     *running_decay.SETTINGS,
+    *sliding_services.SETTINGS,
     *frames.SETTINGS,
     *planar_input.SETTINGS,
 )
@@ -158,6 +158,10 @@ class DecayNode(ModelNode[DecayModel]):
         self.values.on_change(["rate", "stop_below"], self._prepare_stream)
         self.endpoints.add_input(WrenchStamped, "onset", self._begin, stream=False)
         self.endpoints.add_input(WrenchStamped, "measurement", self._measure)
+        self._required = self.endpoints.add_output(
+            NormalForce, "required_normal_force", depth=STREAM_DEPTH
+        )
+        self.endpoints.add_input(WrenchStamped, "held_wrench", self._hold)
         for service in SERVICES:
             self.endpoints.serve(service)
 
@@ -275,6 +279,9 @@ class DecayNode(ModelNode[DecayModel]):
         self._time_left.publish(message)
         self._correct_forecast(now)
 
+    async def _hold(self, message: WrenchStamped) -> None:
+        self._required.publish(await sliding_services.on_held_wrench(self, message))
+
     def _correct_forecast(self, now: int) -> None:
         """Publish what has been learnt since the last forecast, but not too often."""
         if (now - self._forecast_time) * 1e-9 < self.values["forecast_period"]:
@@ -349,39 +356,11 @@ def describe_model(
     response.fit = model_info.provenance(model)
 
 
-async def predict_stop_of_a_body(
-    node: DecayNode, request: PredictStop.Request, response: PredictStop.Response
-) -> None:
-    """Answer `~/predict_stop`."""
-    model, body = node.host.models[request.model], node.surfaces.models[request.surface]
-    surface, wrench, frame = await node.input.wrench(body, request.wrench)
-    twist, load_factor = surface.twist_and_load_factor(wrench)
-    factor = float(load_factor)
-    stop = holds_from(model.sum, factor, model.max_error)
-    # A load that goes to a constant may never let the body rest.
-    end = max(node.values["horizon"], stop.time if np.isfinite(stop.time) else 0.0)
-    times = np.linspace(0.0, end, node.values["forecast_points"])
-    response.slides = stop.slides
-    response.load_factor = factor
-    response.stop_time = stop.time
-    response.earliest_stop_time = stop.earliest
-    response.latest_stop_time = stop.latest
-    convert.fill_twist(response.twist.twist, twist_at_origin(body, twist))
-    convert.fill_header(response.twist.header, request.wrench.header, frame)
-    response.times = convert.flat_of(times)
-    response.load_factors = convert.flat_of(factor * model.sum(times) / onset_value(model.sum))
-
-
 SERVICES = (
     Service(ListDecays, "list_models", DecayNode.list_models),
     Service(DescribeModel, "describe_model", describe_model),
     *running_decay.SERVICES,
-    Service(
-        PredictStop,
-        "predict_stop",
-        predict_stop_of_a_body,
-        unbounded=("stop_time", "earliest_stop_time", "latest_stop_time"),
-    ),
+    *sliding_services.SERVICES,
 )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The decay part of the demonstration: an onset, the falling wrench, and when sliding stops."""
+"""The decay part of the demonstration: an onset, the falling wrench, and a slide that ends."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from geometry_msgs.msg import WrenchStamped
-from limit_surface_interfaces.srv import EvaluateDecay, PredictStop
+from geometry_msgs.msg import InertiaStamped, WrenchStamped
+from limit_surface_interfaces.srv import EvaluateDecay, PredictSlide, PredictStop
 from rclpy.qos import QoSProfile
 
 from limit_surface_ros.nodes import convert
@@ -24,8 +24,12 @@ if TYPE_CHECKING:
 MODEL = "exponential"
 TOLERANCE = 1e-6
 ROWS = 8
-AFTER = 1.25  # of the time of the stop: how long the wrench is watched
-HEADING = f"{'t [s]':>7}{'fx [N]':>10}{'fy [N]':>10}{'tau [Nm]':>10}{'factor':>9}  body"
+AFTER = 1.25  # of the time until friction can hold the body: how long the wrench is watched
+MASS, MOMENT = 0.3, 5e-4  # [kg], [kg m^2]
+# How nearly straight the slide is, in parts of its time: the patch is a triangle.
+STRAIGHT = 0.05
+HEADING = f"{'t [s]':>7}{'fx [N]':>10}{'fy [N]':>10}{'tau [Nm]':>10}{'factor':>9}  friction"
+SLIDE_HEADING = f"{'t [s]':>7}{'x [m]':>10}{'y [m]':>10}{'turn [deg]':>11}{'speed [m/s]':>12}"
 
 
 class FallingWrench:
@@ -102,24 +106,58 @@ def show(client: ServiceClient, namespace: str, frame: str, load: Sequence[float
     push = WrenchStamped()
     push.header.frame_id = frame
     convert.fill_wrench(push.wrench, load)
-    stop = _ask(client, PredictStop, f"{prefix}/predict_stop", model=MODEL, wrench=push)
-    factor = stop.load_factor
+    held = _ask(client, PredictStop, f"{prefix}/predict_stop", model=MODEL, wrench=push)
+    factor = held.load_factor
     print(f"\na push of {factor:.3f} times the limit that dies away as exp(-{rate:.3g} t)\n")
     print(HEADING)
     falling = FallingWrench(client, prefix, push)
-    times, loads = falling.until(AFTER * stop.stop_time)
+    times, loads = falling.until(AFTER * held.holds_from)
     factors = factor * np.exp(-rate * times)
     for row in np.linspace(0, len(times) - 1, ROWS).astype(int):
         numbers = f"{times[row]:>7.3f}" + "".join(f"{part:>10.4f}" for part in loads[row])
-        body = "slides" if factors[row] > 1.0 else "rests"
-        print(f"{numbers}{factors[row]:>9.3f}  {body}")
+        friction = "gives way" if factors[row] > 1.0 else "can hold"
+        print(f"{numbers}{factors[row]:>9.3f}  {friction}")
     closed_form = math.log(factor) / rate
     error = float(np.abs(loads - np.multiply.outer(factors / factor, load)).max())
     print(
-        f"\nit stops after {stop.stop_time:.9f} s; the closed form ln(factor) / rate says "
-        f"{closed_form:.9f} s\n{len(times)} wrenches came, at most {error:.1e} N off exp"
+        f"\nfriction can hold it after {held.holds_from:.9f} s; the closed form ln(factor) / rate "
+        f"says {closed_form:.9f} s\n{len(times)} wrenches came, at most {error:.1e} N off exp"
     )
-    return abs(stop.stop_time - closed_form) < TOLERANCE and error < TOLERANCE
+    agrees = abs(held.holds_from - closed_form) < TOLERANCE and error < TOLERANCE
+    return _show_slide(client, prefix, push, factor, rate) and agrees
+
+
+def _show_slide(
+    client: ServiceClient, prefix: str, push: WrenchStamped, factor: float, rate: float
+) -> bool:
+    """Let the same load move a body with mass; print its slide and whether its momentum agrees."""
+    inertia = InertiaStamped()
+    inertia.inertia.m, inertia.inertia.izz = MASS, MOMENT
+    found = _ask(
+        client,
+        PredictSlide,
+        f"{prefix}/predict_slide",
+        model=MODEL,
+        inertia=inertia,
+        wrench=push,
+        points=ROWS,
+    )
+    print(f"\na body of {MASS:g} kg that this push sets moving\n")
+    print(SLIDE_HEADING)
+    twists = np.array(found.twists).reshape(-1, 3)
+    for time, stamped, twist in zip(found.times, found.path.poses, twists, strict=True):
+        position, turn = stamped.pose.position, stamped.pose.orientation
+        heading = math.degrees(2.0 * math.atan2(turn.z, turn.w))
+        speed = math.hypot(twist[0], twist[1])
+        print(f"{time:>7.3f}{position.x:>10.4f}{position.y:>10.4f}{heading:>11.3f}{speed:>12.4f}")
+    # The impulse of a straight push is used up by friction: s (1 - exp(-r T)) / r = T.
+    used_up = factor * -math.expm1(-rate * found.stop_time) / rate
+    print(
+        f"\nit rests after {found.stop_time:.6f} s, when friction has used up the momentum of the "
+        f"push (straight: {used_up:.6f} s)"
+    )
+    balanced = found.energy_residual < TOLERANCE
+    return balanced and abs(used_up - found.stop_time) < STRAIGHT * found.stop_time
 
 
 def _ask(client: ServiceClient, service_type: Any, name: str, **fields: Any) -> Any:

@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from collections.abc import Generator
 
     from geometry_msgs.msg import InertiaStamped, WrenchStamped
-    from std_msgs.msg import Header
 
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.files.decay_file import DecayModel
@@ -103,9 +102,7 @@ async def _in_turns(node: DecayNode, stages: Generator[None, None, Any]) -> Any:
         await node.endpoints.give_way()
 
 
-async def _inertia_of(
-    node: DecayNode, model: SurfaceModel, stamped: InertiaStamped
-) -> Inertia:
+async def _inertia_of(node: DecayNode, model: SurfaceModel, stamped: InertiaStamped) -> Inertia:
     """Return an inertia about a model's reference point.
 
     Raises:
@@ -159,7 +156,7 @@ async def predict_slide(
     node: DecayNode, request: PredictSlide.Request, response: PredictSlide.Response
 ) -> None:
     """Answer `~/predict_slide`."""
-    model, decay = node.surfaces[request.surface], node.models[request.model]
+    model, decay = node.surfaces.models[request.surface], node.host.models[request.model]
     horizon = convert.checked_number("horizon", request.horizon) or LONGEST
     points = request.points or node.values["forecast_points"]
     if not 2 <= points <= MOST_POINTS:
@@ -176,9 +173,7 @@ async def predict_slide(
     body = SlidingBody(surface, inertia)
     # In the axes of the surface's frame as it is at the start.
     place = (*model.reference_point, 0.0)
-    found: Slide = await _in_turns(
-        node, slide_stages(body, twist, load, place, horizon=horizon)
-    )
+    found: Slide = await _in_turns(node, slide_stages(body, twist, load, place, horizon=horizon))
     earliest = latest = found.time
     if load is not None:
         earliest, latest = await _in_turns(
@@ -236,7 +231,7 @@ async def predict_stop(
     node: DecayNode, request: PredictStop.Request, response: PredictStop.Response
 ) -> None:
     """Answer `~/predict_stop`."""
-    decay, model = node.models[request.model], node.surfaces[request.surface]
+    decay, model = node.host.models[request.model], node.surfaces.models[request.surface]
     surface, wrench, frame = await node.input.wrench(model, request.wrench)
     twist, load_factor = surface.twist_and_load_factor(wrench)
     factor = float(load_factor)
@@ -278,7 +273,7 @@ async def predict_slip_of_a_grasp(
     node: DecayNode, request: PredictSlip.Request, response: PredictSlip.Response
 ) -> None:
     """Answer `~/predict_slip`."""
-    decay, model = node.models[request.model], node.surfaces[request.surface]
+    decay, model = node.host.models[request.model], node.surfaces.models[request.surface]
     margin = convert.checked_number("margin", request.margin) or 1.0
     exponent = convert.checked_number("contact_exponent", request.contact_exponent)
     surface, wrench, _ = await node.input.wrench(model, request.wrench)
@@ -318,7 +313,7 @@ async def on_held_wrench(node: DecayNode, stamped: WrenchStamped) -> NormalForce
 async def _required(
     node: DecayNode, name: str, stamped: WrenchStamped, margin: float, exponent: float
 ) -> NormalForce:
-    model = node.surfaces[name]
+    model = node.surfaces.models[name]
     surface, wrench, frame = await node.input.wrench(model, stamped)
     normal_force = _normal_force_of(model, surface)
     if normal_force is None:

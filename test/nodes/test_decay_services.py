@@ -135,7 +135,7 @@ def test_the_stop_of_one_exponential_is_the_closed_form(stop):
     assert answer.error_code == ErrorCode.NONE
     assert answer.slides
     assert answer.load_factor == pytest.approx(factor, rel=1e-12)
-    assert answer.stop_time == pytest.approx(math.log(factor) / 0.7, abs=1e-9)
+    assert answer.holds_from == pytest.approx(math.log(factor) / 0.7, abs=1e-9)
     np.testing.assert_allclose(
         planar_twist(answer.twist), SURFACE.surface.twist_of_wrench(wrench), atol=1e-12
     )
@@ -144,21 +144,21 @@ def test_the_stop_of_one_exponential_is_the_closed_form(stop):
     times = np.array(answer.times)
     np.testing.assert_allclose(answer.load_factors, factor * np.exp(-0.7 * times), rtol=1e-12)
     slides = np.array(answer.load_factors) > 1.0
-    assert (slides == (times < answer.stop_time)).all()
+    assert (slides == (times < answer.holds_from)).all()
 
 
 def test_the_stop_of_a_fitted_model_comes_with_its_error_bound(stop):
     wrench = [6.0, 3.0, 0.2]
     answer = stop(PredictStop.Request(surface="box", wrench=wrench_message(wrench)))
     expected = holds_from(SUM, float(SURFACE.surface.load_factor(wrench)), MAX_ERROR)
-    assert answer.stop_time == expected.time
-    assert answer.earliest_stop_time == expected.earliest < answer.stop_time
-    assert answer.latest_stop_time == expected.latest > answer.stop_time
+    assert answer.holds_from == expected.time
+    assert answer.earliest_holds_from == expected.earliest < answer.holds_from
+    assert answer.latest_holds_from == expected.latest > answer.holds_from
 
 
 def test_a_push_below_the_limit_stops_at_once(stop):
     answer = stop(PredictStop.Request(wrench=wrench_message([0.1, 0.0, 0.0])))
-    assert (answer.error_code, answer.slides, answer.stop_time) == (ErrorCode.NONE, False, 0.0)
+    assert (answer.error_code, answer.slides, answer.holds_from) == (ErrorCode.NONE, False, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -26,14 +26,16 @@ def test_the_demonstration_prints_a_table_and_checks_it(output):
     assert "round trips agree" in output
 
 
-def test_the_demonstration_shows_a_wrench_that_falls_until_sliding_stops(output):
+def test_the_demonstration_shows_a_wrench_that_falls_until_friction_can_hold(output):
     rows = re.findall(
-        r"^ *\d+\.\d{3}(?: +-?\d+\.\d{4}){3} +\d+\.\d{3}  (\w+)$", output, re.MULTILINE
+        r"^ *\d+\.\d{3}(?: +-?\d+\.\d{4}){3} +\d+\.\d{3}  (gives way|can hold)$",
+        output,
+        re.MULTILINE,
     )
     assert len(rows) == 8
     assert rows == sorted(rows, reverse=True)
-    assert set(rows) == {"slides", "rests"}
-    found, closed = re.search(r"stops after (\S+) s; .* says (\S+) s", output).groups()
+    assert set(rows) == {"gives way", "can hold"}
+    found, closed = re.search(r"hold it after (\S+) s; .* says (\S+) s", output).groups()
     assert float(found) == pytest.approx(float(closed), abs=1e-6)
 
 
@@ -54,3 +56,17 @@ def test_nobody_is_waited_for_who_has_ended():
         pytest.raises(TimeoutError, match="there is no service /absent"),
     ):
         client.call(ListModels, "/absent", ListModels.Request())
+
+
+def test_the_demonstration_shows_a_slide_that_ends(output):
+    rows = re.findall(
+        r"^ *\d+\.\d{3}((?: +-?\d+\.\d{4}){2} +-?\d+\.\d{3} +\d+\.\d{4})$", output, re.M
+    )
+    assert len(rows) == 8
+    speeds = [float(row.split()[-1]) for row in rows]
+    assert speeds[0] == speeds[-1] == 0.0
+    assert max(speeds) > 0.1
+    rests, held = (
+        float(re.search(rf"{words} after (\S+) s", output)[1]) for words in ("it rests", "hold it")
+    )
+    assert rests > held

@@ -84,5 +84,5 @@ def test_the_stop_of_a_push_is_that_of_the_true_relaxation(ros, client_node, tmp
     factor = float(SURFACE.surface.load_factor([5.0, 1.0, 0.05]))
     times = np.linspace(0.0, 5.0, 500_001)
     expected = times[np.argmax(factor * relaxation(times) < 1.0)]
-    assert answer.stop_time == pytest.approx(expected, abs=0.01)
-    assert answer.earliest_stop_time < expected < answer.latest_stop_time
+    assert answer.holds_from == pytest.approx(expected, abs=0.01)
+    assert answer.earliest_holds_from < expected < answer.latest_holds_from
