@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from limit_surface_ros.files.decay_file import DecayModel
     from limit_surface_ros.files.surface_file import SurfaceModel
     from limit_surface_ros.motion.sliding.result import Slide
-    from limit_surface_ros.nodes.decay_node import DecayNode
     from limit_surface_ros.surface.base import LimitSurface
 
 SETTINGS = (
@@ -92,7 +91,7 @@ class Start(NamedTuple):
     frame: str
 
 
-async def _in_turns(node: DecayNode, stages: Generator[None, None, Any]) -> Any:
+async def _in_turns(node: Any, stages: Generator[None, None, Any]) -> Any:
     """Return what a generator returns, and let others have their turn at each of its pauses."""
     while True:
         try:
@@ -102,7 +101,7 @@ async def _in_turns(node: DecayNode, stages: Generator[None, None, Any]) -> Any:
         await node.endpoints.give_way()
 
 
-async def _inertia_of(node: DecayNode, model: SurfaceModel, stamped: InertiaStamped) -> Inertia:
+async def _inertia_of(node: Any, model: SurfaceModel, stamped: InertiaStamped) -> Inertia:
     """Return an inertia about a model's reference point.
 
     Raises:
@@ -122,7 +121,7 @@ async def _inertia_of(node: DecayNode, model: SurfaceModel, stamped: InertiaStam
     return Inertia(mass, float(up @ full @ up), transform.point(centre)[:2])
 
 
-def _start_of(node: DecayNode, model: SurfaceModel, stamped: PoseStamped) -> Start:
+def _start_of(node: Any, model: SurfaceModel, stamped: PoseStamped) -> Start:
     """Return where a slide begins.
 
     Raises:
@@ -153,7 +152,7 @@ def _load_of(wrench: Floats, decay: DecayModel, in_world: bool) -> Load | None:
 
 
 async def predict_slide(
-    node: DecayNode, request: PredictSlide.Request, response: PredictSlide.Response
+    node: Any, request: PredictSlide.Request, response: PredictSlide.Response
 ) -> None:
     """Answer `~/predict_slide`."""
     model, decay = node.surfaces.models[request.surface], node.host.models[request.model]
@@ -228,7 +227,7 @@ def _fill_path(
 
 
 async def predict_stop(
-    node: DecayNode, request: PredictStop.Request, response: PredictStop.Response
+    node: Any, request: PredictStop.Request, response: PredictStop.Response
 ) -> None:
     """Answer `~/predict_stop`."""
     decay, model = node.host.models[request.model], node.surfaces.models[request.surface]
@@ -270,7 +269,7 @@ def _normal_force_of(model: SurfaceModel, surface: LimitSurface) -> float | None
 
 
 async def predict_slip_of_a_grasp(
-    node: DecayNode, request: PredictSlip.Request, response: PredictSlip.Response
+    node: Any, request: PredictSlip.Request, response: PredictSlip.Response
 ) -> None:
     """Answer `~/predict_slip`."""
     decay, model = node.host.models[request.model], node.surfaces.models[request.surface]
@@ -292,7 +291,7 @@ async def predict_slip_of_a_grasp(
 
 
 async def required_normal_force(
-    node: DecayNode,
+    node: Any,
     request: RequiredNormalForce.Request,
     response: RequiredNormalForce.Response,
 ) -> None:
@@ -302,7 +301,7 @@ async def required_normal_force(
     response.required = await _required(node, request.surface, request.wrench, margin, exponent)
 
 
-async def on_held_wrench(node: DecayNode, stamped: WrenchStamped) -> NormalForce:
+async def on_held_wrench(node: Any, stamped: WrenchStamped) -> NormalForce:
     """Return what a wrench of `~/held_wrench` asks for."""
     values = node.values
     return await _required(
@@ -311,7 +310,7 @@ async def on_held_wrench(node: DecayNode, stamped: WrenchStamped) -> NormalForce
 
 
 async def _required(
-    node: DecayNode, name: str, stamped: WrenchStamped, margin: float, exponent: float
+    node: Any, name: str, stamped: WrenchStamped, margin: float, exponent: float
 ) -> NormalForce:
     model = node.surfaces.models[name]
     surface, wrench, frame = await node.input.wrench(model, stamped)
