@@ -131,3 +131,12 @@ def test_an_error_as_large_as_what_friction_holds_leaves_the_end_open():
     assert stop_bracket(body, AT_REST, Load([3.0, 0.0, 0.0], FADING), 0.34)[1] == math.inf
     with pytest.raises(RangeError, match="max_error"):
         stop_bracket(body, AT_REST, Load([3.0, 0.0, 0.0], FADING), -1.0)
+
+
+def test_a_load_is_above_friction_along_itself_or_against():
+    load = Load([1.0, 0.0, 0.0], ExponentialSum([-0.1 + 2.0j], [-3.0]))
+    along, against = load.next_above(0.5, math.inf, 1.0), load.next_above(math.inf, 0.5, 0.0)
+    assert load.fraction(along) == pytest.approx(0.5, abs=1e-12)
+    assert load.fraction(against) == pytest.approx(-0.5, abs=1e-12)
+    assert load.next_above(0.5, 0.5, 0.6) == against
+    assert load.next_above(math.inf, math.inf, 0.0) is None

@@ -119,18 +119,25 @@ class Load:
         """What is left of the onset for ever, the constant of x over x(0)."""
         return self.decay.constant / self.decay.start
 
-    def next_above(self, fraction: float, start: float) -> float | None:
-        """Return the first time from `start` on at which |x(t) / x(0)| exceeds a fraction.
+    def next_above(self, along: float, against: float, start: float) -> float | None:
+        """Return the first time from `start` on at which x(t) / x(0) exceeds a fraction.
 
-        None if it never does.
+        Args:
+            along: Fraction that it must exceed above zero.
+            against: Fraction that it must exceed below zero.
+            start: [s].
+
+        Returns:
+            The time [s]; None if it never does.
         """
-        level = fraction * abs(self.decay.start)
-        times = [
-            time
-            for x in (self.decay, type(self.decay)(self.decay.rates, -self.decay.coefficients))
-            if (time := first_above(x, level, start)) is not None
-        ]
-        return min(times, default=None)
+        size = abs(self.decay.start)
+        upwards = math.copysign(1.0, self.decay.start)
+        times = []
+        for sign, fraction in ((upwards, along), (-upwards, against)):
+            if fraction < math.inf:
+                x = type(self.decay)(self.decay.rates, sign * self.decay.coefficients)
+                times.append(first_above(x, fraction * size, start))
+        return min((time for time in times if time is not None), default=None)
 
     def in_body(self, heading: float) -> Floats:
         """Return w(0) in the axes of a body of some heading [rad], shape (3,)."""

@@ -146,14 +146,15 @@ class Run:
         if load is None or not load.wrench.any():
             return None
         onset = load.in_body(state.pose[2])
-        factor = float(self._body.surface.load_factor(onset))
+        along, against = self._body.surface.load_factor(np.array([onset, -onset])).tolist()
+        needed = (1.0 / along if along else math.inf, 1.0 / against if against else math.inf)
         time, began = state.time, state.time
         while True:
-            following = load.next_above(1.0 / factor, time) if factor else None
+            following = load.next_above(needed[0], needed[1], time)
             if following is None:
                 return None
             self._check(following)
-            started = self._first_step(state, following, onset, factor)
+            started = self._first_step(state, following, onset, along, against)
             if started is not None:
                 if following > began or self._evaluations:
                     self._rests.append((began, following))
@@ -161,7 +162,9 @@ class Run:
             # The load exceeds friction too briefly to move anything.
             time = following + _SHORT * load.shortest_time
 
-    def _first_step(self, state: State, time: float, onset: Floats, factor: float) -> State | None:
+    def _first_step(
+        self, state: State, time: float, onset: Floats, along: float, against: float
+    ) -> State | None:
         """Return the state after the impulse of the load in a first short step."""
         load = self._load
         assert load is not None
@@ -170,7 +173,7 @@ class Run:
         last = None
         for _ in range(40):
             left = load.mean_fraction(time, time + span)
-            if factor * abs(left) > 1.0:
+            if (along if left > 0.0 else against) * abs(left) > 1.0:
                 wrench = left * onset
                 direction = self._body.surface.twist_of_wrench(wrench)
                 a = acceleration(self._friction, self._matrix, wrench, direction)

@@ -69,6 +69,7 @@ def slide(
 
     Example:
         >>> import numpy as np
+        >>> from limit_surface_ros.motion.sliding.inertia import Inertia
         >>> from limit_surface_ros.surface.kinds.power_sum import PowerSum
         >>> from limit_surface_ros.surface.scaling import Scaling
         >>> surface = PowerSum.norms([np.eye(3)], Scaling(0.05, friction_force=2.0))
