@@ -145,11 +145,13 @@ def _show_slide(
     print(f"\na body of {MASS:g} kg that this push sets moving\n")
     print(SLIDE_HEADING)
     twists = np.array(found.twists).reshape(-1, 3)
-    for time, stamped, twist in zip(found.times, found.path.poses, twists, strict=True):
+    for second, stamped, twist in zip(found.times, found.path.poses, twists, strict=True):
         position, turn = stamped.pose.position, stamped.pose.orientation
         heading = math.degrees(2.0 * math.atan2(turn.z, turn.w))
         speed = math.hypot(twist[0], twist[1])
-        print(f"{time:>7.3f}{position.x:>10.4f}{position.y:>10.4f}{heading:>11.3f}{speed:>12.4f}")
+        print(
+            f"{second:>7.3f}{position.x:>10.4f}{position.y:>10.4f}{heading:>11.3f}{speed:>12.4f}"
+        )
     # The impulse of a straight push is used up by friction: s (1 - exp(-r T)) / r = T.
     used_up = factor * -math.expm1(-rate * found.stop_time) / rate
     print(
