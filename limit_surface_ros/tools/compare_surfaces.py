@@ -31,17 +31,16 @@ from limit_surface_ros.fitting.workers import available_cores
 from limit_surface_ros.plots.canvas import SUFFIXES, new_figure, save_figure
 from limit_surface_ros.plots.distributions import draw_distributions
 from limit_surface_ros.surface.measures import load_error, quantiles, velocity_error
-from limit_surface_ros.tools.common.fit_options import OF_AUTO
-from limit_surface_ros.tools.common.options import check_output, named_path, refuse_unused
-from limit_surface_ros.tools.common.program import program_parser, progress_bar, run_program
-from limit_surface_ros.tools.common.same_point import About, require_one_point
-from limit_surface_ros.tools.common.surface_fit import (
+from limit_surface_ros.tools.common.fit_options import (
+    OF_AUTO,
     RANGES,
     add_fit_options,
     check_fit_options,
-    fit,
-    read_input,
 )
+from limit_surface_ros.tools.common.options import check_output, named_path, refuse_unused
+from limit_surface_ros.tools.common.program import program_parser, progress_bar, run_program
+from limit_surface_ros.tools.common.same_point import About, require_one_point
+from limit_surface_ros.tools.common.surface_fit import fit, read_input
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

@@ -33,7 +33,12 @@ from limit_surface_ros.tools.common.executors import (
     check_address,
     dask_executor,
 )
-from limit_surface_ros.tools.common.fit_options import refuse_options_of_others
+from limit_surface_ros.tools.common.fit_options import (
+    add_fit_options,
+    add_frame_option,
+    check_fit_options,
+    refuse_options_of_others,
+)
 from limit_surface_ros.tools.common.options import refuse_empty
 from limit_surface_ros.tools.common.program import (
     FAILED,
@@ -41,12 +46,7 @@ from limit_surface_ros.tools.common.program import (
     progress_bar,
     run_program,
 )
-from limit_surface_ros.tools.common.surface_fit import (
-    add_fit_options,
-    add_frame_option,
-    check_fit_options,
-    fit_model,
-)
+from limit_surface_ros.tools.common.surface_fit import fit_model
 from limit_surface_ros.tools.common.training_data import (
     ACCEPTED,
     SUFFIXES,

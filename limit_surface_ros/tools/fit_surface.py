@@ -17,15 +17,15 @@ from limit_surface_ros.files.surface_file import write_surface_model
 from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
 from limit_surface_ros.fitting.search import AGREEMENT, process_pool
 from limit_surface_ros.fitting.workers import available_cores
-from limit_surface_ros.tools.common.fit_options import refuse_options_of_others
-from limit_surface_ros.tools.common.options import check_output, named_path, refuse_empty
-from limit_surface_ros.tools.common.program import program_parser, progress_bar, run_program
-from limit_surface_ros.tools.common.surface_fit import (
+from limit_surface_ros.tools.common.fit_options import (
     add_fit_options,
     add_frame_option,
     check_fit_options,
-    fit_model,
+    refuse_options_of_others,
 )
+from limit_surface_ros.tools.common.options import check_output, named_path, refuse_empty
+from limit_surface_ros.tools.common.program import program_parser, progress_bar, run_program
+from limit_surface_ros.tools.common.surface_fit import fit_model
 from limit_surface_ros.tools.common.training_data import ACCEPTED, check_input
 
 if TYPE_CHECKING:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What fit_surface and fit_catalogue share: the options of a fit, and the fit of one input."""
+"""The fit of one input, as the options ask for it: what fit_surface and fit_catalogue share."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from limit_surface_ros.checks import counted
 from limit_surface_ros.errors import DataError, RangeError
 from limit_surface_ros.files.body_file import read_body
 from limit_surface_ros.files.contact_file import read_contact
-from limit_surface_ros.files.surface_file import LARGEST_SCALE, SurfaceModel
+from limit_surface_ros.files.surface_file import SurfaceModel
 from limit_surface_ros.fitting.description import Description, describe_fit
-from limit_surface_ros.fitting.dissipation import FITTED_ON, fit_dissipation
+from limit_surface_ros.fitting.dissipation import fit_dissipation
 from limit_surface_ros.fitting.few_pushes.automatic import fit_automatically
 from limit_surface_ros.fitting.few_pushes.calibration import squared_residuals
 from limit_surface_ros.fitting.pairs import scaling_of_pairs
@@ -29,9 +29,15 @@ from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.kinds.dissipation_scatter import region_quantile
 from limit_surface_ros.surface.kinds.power_sum import thesis_exponents
 from limit_surface_ros.surface.scaling import Scaling
-from limit_surface_ros.tools.common.bag_options import add_bag_options
-from limit_surface_ros.tools.common.csv_options import add_cell_options, cell_options
-from limit_surface_ros.tools.common.options import check_ranges
+from limit_surface_ros.tools.common.csv_options import cell_options
+from limit_surface_ros.tools.common.fit_options import (
+    DEFAULT_FRAME,
+    EXACT,
+    FEW_TERMS,
+    PATCH_TERMS,
+    kind_of,
+    objective_of,
+)
 from limit_surface_ros.tools.common.training_data import (
     BAG,
     BODY,
@@ -56,38 +62,8 @@ if TYPE_CHECKING:
     from limit_surface_ros.tools.common.training_data import TrainingData
 
 
-# What numbers the fit takes: the upper ends keep a slip of the keyboard from filling the memory.
-RANGES = {
-    "seed": (0, 2**63 - 1),
-    "motions": (1, 1_000_000),
-    "facet_loads": (0, 100_000),
-    "friction_coefficient": (1e-6, 1e6),
-    "normal_force": (1.0 / LARGEST_SCALE, LARGEST_SCALE),
-    "load_noise": (0.0, 1e6),
-    "motion_noise": (0.0, 1e6),
-    "characteristic_length": (1.0 / LARGEST_SCALE, LARGEST_SCALE),
-    "terms": (1, 1000),
-    "velocity_weight": (0.0, 1e12),
-    "starts": (1, 1_000_000),
-    "folds": (2, 1000),
-    "bootstrap": (0, 100_000),
-}
-VELOCITY_WEIGHT = 1.0
 # Mean angle on its own data [deg] beyond which a model is none of them.
 WRONG_ANGLE = 25.0
-# Frame of a model whose data state none.
-DEFAULT_FRAME = "object"
-# The kind that needs no fit.
-EXACT = "exact"
-# Terms where none are asked for, of a contact's dissipation and of all else: a patch is met within
-# a degree by six, and one of two axes of symmetry within as much.
-PATCH_TERMS, FEW_TERMS = 6, 3
-# What each kind can be fitted by, the default first.
-OBJECTIVES: dict[str, tuple[str, ...]] = {
-    "power_sum": ("J2", "J1", "second"),
-    "dissipation": FITTED_ON,
-    "polynomial": ("least-squares", "convex"),
-}
 
 
 @dataclass(frozen=True)
@@ -105,148 +81,6 @@ class FittedModel:
     result: FitResult
     description: Description
     sureness: str = ""
-
-
-def add_fit_options(parser: argparse.ArgumentParser) -> None:
-    """Declare every option on which the fitted model depends, but for its name."""
-    _add_data_options(parser.add_argument_group("data"))
-    add_bag_options(parser)
-
-    fit = parser.add_argument_group("fit")
-    fit.add_argument(
-        "--kind",
-        choices=[EXACT, *OBJECTIVES],
-        help="of surface; exact takes the support points as they are, a polynomial is of fourth "
-        "order; default: exact for a contact of points unless another option of the fit is given, "
-        "else dissipation for a contact, and power_sum for pushes",
-    )
-    fit.add_argument(
-        "--terms",
-        type=int,
-        help="terms of the model; default: 6 of a dissipation of a contact, else 3",
-    )
-    fit.add_argument(
-        "--family",
-        choices=["norms", "thesis"],
-        help="exponents of a power_sum: 1/2 for every term, which is always convex, or 1, "
-        "(n-1)/n, ..., 1/n, of which those below 1/2 may bend it inward (default norms for a "
-        "contact, thesis for pushes)",
-    )
-    fit.add_argument(
-        "--objective",
-        choices=[*OBJECTIVES["power_sum"], *FITTED_ON, *OBJECTIVES["polynomial"]],
-        help="of a power_sum: J1 fits loads, J2 loads and motions, second is J2 of two terms with "
-        "one by least squares inside (default J2); of a dissipation: forces, directions or both "
-        "(default forces for contacts, directions for pushes); of a polynomial: least-squares on "
-        "loads, or convex on loads and motions (default least-squares)",
-    )
-    fit.add_argument(
-        "--velocity-weight",
-        type=float,
-        default=VELOCITY_WEIGHT,
-        metavar="W",
-        help="weight of the motions, in all but J1, forces and least-squares (%(default)s)",
-    )
-    fit.add_argument(
-        "--starts",
-        type=int,
-        default=Search.starts,
-        help="starts at most, half of them random, the others near the best so far (%(default)s)",
-    )
-    fit.add_argument("--seed", type=int, default=0, help="of all that is random (%(default)s)")
-
-    few = parser.add_argument_group("few, noisy pushes")
-    few.add_argument(
-        "--auto",
-        action="store_true",
-        help="choose kind, terms, weight and the prior of the fit (the pressure on the "
-        "ground that fits the pushes, or an ellipsoid) by cross-validation; leaves the options "
-        "above aside",
-    )
-    few.add_argument(
-        "--folds",
-        type=int,
-        default=5,
-        help="of the cross-validation; at most one for each push (%(default)s)",
-    )
-    few.add_argument(
-        "--support",
-        action="store_true",
-        help="let --auto use the support points that the pushes' first line states",
-    )
-    few.add_argument(
-        "--bootstrap",
-        type=int,
-        default=0,
-        metavar="N",
-        help="refit N times with random weights of the pushes and store the surfaces, whose "
-        "spread shows how sure a predicted twist is (with --auto)",
-    )
-
-
-def add_frame_option(parser: argparse.ArgumentParser) -> None:
-    """Declare the frame of the models that a program writes."""
-    parser.add_argument(
-        "--frame-id", help=f"the model's frame; default: the contact's, or {DEFAULT_FRAME}"
-    )
-
-
-def _add_data_options(data: argparse._ArgumentGroup) -> None:
-    data.add_argument(
-        "--rows", help="rows of a CSV to fit, such as 0,3,10-14; others are held out"
-    )
-    add_cell_options(data)
-    data.add_argument(
-        "--anyway",
-        action="store_true",
-        help="fit to recorded pushes although their units, axes or signs are not those of a body",
-    )
-    data.add_argument(
-        "--characteristic-length",
-        type=float,
-        metavar="M",
-        help="makes moments and rotations comparable [m]; default: what the data state, or the "
-        "ratio of moments to forces in them",
-    )
-    data.add_argument("--link", help="link of a URDF or SDF that stands on the ground")
-    data.add_argument(
-        "--friction-coefficient",
-        type=float,
-        metavar="MU",
-        help="under the link; default: what the URDF or SDF states",
-    )
-    data.add_argument(
-        "--normal-force",
-        type=float,
-        metavar="N",
-        help="on the ground under the link [N]; default: the weight of its mass",
-    )
-    data.add_argument(
-        "--motions", type=int, default=2000, help="random motions of a contact (%(default)s)"
-    )
-    data.add_argument(
-        "--facet-loads",
-        type=int,
-        default=150,
-        help="loads on each facet of a contact of a few points (%(default)s)",
-    )
-    for what, of in (("load", "each component's root mean square"), ("motion", "a unit motion")):
-        data.add_argument(
-            f"--{what}-noise",
-            type=float,
-            default=0.0,
-            metavar="S",
-            help=f"noise added to a contact's {what}s, in parts of {of} (%(default)s)",
-        )
-
-
-def check_fit_options(options: argparse.Namespace) -> None:
-    """Refuse numbers that no fit takes, before there is any work.
-
-    Raises:
-        RangeError: One of them is out of its range; the message names the option.
-    """
-    check_ranges(options, RANGES)
 
 
 def fit_model(
@@ -415,30 +249,6 @@ def exact_model(data: TrainingData) -> FitResult:
     )
 
 
-def kind_of(options: argparse.Namespace, recorded: bool, *, of_points: bool) -> str:
-    """Return the kind of surface that the options ask for.
-
-    Args:
-        options: What is asked for.
-        recorded: Whether the data are recorded pushes.
-        of_points: Whether they are a contact of support points.
-    """
-    if options.kind is not None:
-        return str(options.kind)
-    if recorded or options.family is not None or options.objective in OBJECTIVES["power_sum"]:
-        return "power_sum"
-    return "dissipation" if not of_points or asks_for_a_fit(options) else EXACT
-
-
-def asks_for_a_fit(options: argparse.Namespace) -> bool:
-    """Tell whether an option is given that does nothing to an exact model."""
-    given = {"terms", "family", "objective", "load_noise", "motion_noise"}
-    changed = {"velocity_weight": VELOCITY_WEIGHT, "starts": Search.starts}
-    return any(getattr(options, name) for name in given) or any(
-        getattr(options, name) != default for name, default in changed.items()
-    )
-
-
 def terms_of(options: argparse.Namespace, kind: str, data: TrainingData) -> int:
     """Return the number of terms, that of the options or the usual one of the kind."""
     if options.terms is not None:
@@ -447,29 +257,6 @@ def terms_of(options: argparse.Namespace, kind: str, data: TrainingData) -> int:
         return FEW_TERMS
     points = len(data.support.points) if data.of_points and data.support else PATCH_TERMS
     return min(points, PATCH_TERMS)
-
-
-def objective_of(options: argparse.Namespace, kind: str, recorded: bool) -> str:
-    """Return the objective, by default the first of the kind's.
-
-    Args:
-        options: What is asked for.
-        kind: Of surface, not exact.
-        recorded: Whether the data are recorded pushes and not a contact.
-
-    Raises:
-        RangeError: The objective is none of the kind's.
-    """
-    accepted = OBJECTIVES[kind]
-    if options.objective is None:
-        on_pushes = kind == "dissipation" and recorded
-        return "directions" if on_pushes else accepted[0]
-    if options.objective not in accepted:
-        raise RangeError(
-            f"--objective {options.objective} is not for --kind {kind}, "
-            f"which takes {', '.join(accepted)}"
-        )
-    return str(options.objective)
 
 
 def support_of(options: argparse.Namespace, data: TrainingData) -> PointContacts | None:
