@@ -41,6 +41,8 @@ DEPTH = 10
 STREAM_DEPTH = 200
 # Requests that wait while one is answered: of more than the usual 10 the oldest would be lost.
 WAITING = 1000
+# The same of services whose replies are large: 64 answers to 10 000 rows are 20 MB.
+WAITING_LARGE = 64
 # Messages of one topic that wait, for a transform say; of more the oldest is refused.
 MOST_WAITING = 500
 
@@ -82,12 +84,15 @@ class Service(NamedTuple):
         handler: Function or coroutine function of the node, the request and the response: fills
             the response, or raises.
         unbounded: Fields of the response that may be infinite, by their dotted names.
+        depth: How many requests may wait to be taken, and how many replies are kept for clients
+            that are slow to take them or have stopped: few where replies are large.
     """
 
     type: Any
     name: str
     handler: Callable[[Any, Any, Any], Any]
     unbounded: tuple[str, ...] = ()
+    depth: int = WAITING
 
 
 class Output(NamedTuple):
@@ -154,7 +159,7 @@ class Endpoints:
         def handler(request: Any, response: Any) -> Any:
             return service.handler(self._node, request, response)
 
-        self._serve(service.type, service.name, handler, refused, check)
+        self._serve(service.type, service.name, handler, refused, check, service.depth)
 
     def serve_trigger(self, name: str, handler: Callable[[Any, Any], Any], unchanged: str) -> None:
         """Serve `~/name` of type std_srvs/Trigger, whose answers hold no error code.
@@ -177,6 +182,7 @@ class Endpoints:
         handler: Callable[[Any, Any], Any],
         refused: Callable[[Exception, str], Any],
         check: answers.FiniteCheck,
+        depth: int = WAITING,
     ) -> None:
         def answer(call: tuple[Any, Any], header: Any) -> None:
             response = call[1]
@@ -204,7 +210,7 @@ class Endpoints:
 
         # rclpy calls this with what the callback returns, once it has; the answer is sent later.
         service = self._node.create_service(
-            kind, f"~/{name}", lambda *call: call, qos_profile=QoSProfile(depth=WAITING)
+            kind, f"~/{name}", lambda *call: call, qos_profile=QoSProfile(depth=depth)
         )
         send, service.send_response = service.send_response, answer
 

@@ -29,7 +29,7 @@ from limit_surface_ros.nodes import (
     surface_markers,
 )
 from limit_surface_ros.nodes.batches import Batches, empty_rows
-from limit_surface_ros.nodes.endpoints import Service
+from limit_surface_ros.nodes.endpoints import WAITING_LARGE, Service
 from limit_surface_ros.nodes.frames import Frames
 from limit_surface_ros.nodes.model_host import model_settings
 from limit_surface_ros.nodes.model_info import ModelList
@@ -240,8 +240,8 @@ async def push_at_a_point(
 SERVICES = (
     Service(WrenchToTwist, "wrench_to_twist", wrench_to_twist),
     Service(TwistToWrench, "twist_to_wrench", twist_to_wrench),
-    Service(WrenchesToTwists, "wrenches_to_twists", wrenches_to_twists),
-    Service(TwistsToWrenches, "twists_to_wrenches", twists_to_wrenches),
+    Service(WrenchesToTwists, "wrenches_to_twists", wrenches_to_twists, depth=WAITING_LARGE),
+    Service(TwistsToWrenches, "twists_to_wrenches", twists_to_wrenches, depth=WAITING_LARGE),
     Service(Push, "push", push_at_a_point),
     Service(ListModels, "list_models", LimitSurfaceNode.list_models),
     Service(DescribeModel, "describe_model", LimitSurfaceNode.describe_model),

@@ -14,11 +14,13 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
 
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import TwistStamped, WrenchStamped
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from limit_surface_interfaces.msg import ErrorCode
 from limit_surface_interfaces.srv import (
+    DescribeModel,
     ListModels,
     Push,
     TwistsToWrenches,
@@ -27,9 +29,11 @@ from limit_surface_interfaces.srv import (
     WrenchToTwist,
 )
 from rclpy.serialization import serialize_message
+from std_msgs.msg import Header
 
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
 from limit_surface_ros.nodes import convert
+from limit_surface_ros.nodes.answers import FiniteCheck
 from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.scaling import Scaling
@@ -80,10 +84,18 @@ def twists(draw):
 @st.composite
 def pushes(draw):
     asked = Push.Request(model=draw(texts), friction=draw(numbers))
-    asked.header.frame_id = draw(texts)
+    asked.header = draw(headers())
     for vector in (asked.contact, asked.normal, asked.velocity):
         vector.x, vector.y, vector.z = draw(numbers), draw(numbers), draw(numbers)
     return asked
+
+
+@st.composite
+def headers(draw):
+    stamp = Time(
+        sec=draw(st.integers(-(2**31), 2**31 - 1)), nanosec=draw(st.integers(0, 2**32 - 1))
+    )
+    return Header(frame_id=draw(texts), stamp=draw(st.sampled_from([Time(), stamp])))
 
 
 REQUESTS = {
@@ -97,14 +109,15 @@ REQUESTS = {
     ),
     "wrenches_to_twists": (
         WrenchesToTwists,
-        st.builds(WrenchesToTwists.Request, model=texts, wrenches=flats),
+        st.builds(WrenchesToTwists.Request, header=headers(), model=texts, wrenches=flats),
     ),
     "twists_to_wrenches": (
         TwistsToWrenches,
-        st.builds(TwistsToWrenches.Request, model=texts, twists=flats),
+        st.builds(TwistsToWrenches.Request, header=headers(), model=texts, twists=flats),
     ),
     "push": (Push, pushes()),
     "list_models": (ListModels, st.builds(ListModels.Request)),
+    "describe_model": (DescribeModel, st.builds(DescribeModel.Request, model=texts)),
 }
 MODES = [
     {},
@@ -117,6 +130,28 @@ MODES = [
 def fuzzed(ros, client_node, model_file, request):
     _, path = model_file(normal_force=10.0)
     return ros.add(LimitSurfaceNode, files=[path], parameters=request.param)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", REQUESTS)
+def test_three_thousand_requests_of_each_kind_get_codes_of_the_package(
+    ros, client_node, model_file, name
+):
+    _, path = model_file(normal_force=10.0)
+    transforms = ["object tool 1 2 3 0.1 0.2 0.3"]
+    node = ros.add(LimitSurfaceNode, files=[path], parameters={"static_transforms": transforms})
+    service_type, requests = REQUESTS[name]
+    call = ros.client(client_node, service_type, f"/limit_surface/{name}")
+
+    @settings(many, max_examples=3000)
+    @given(request=requests)
+    def check(request):
+        answer = call(request)
+        assert answer.error_code in CODES, answer.error_msg
+        FiniteCheck(service_type.Response)(answer)
+
+    check()
+    assert not [code for _, code in node.health.refused if code == "INTERNAL"]
 
 
 @pytest.mark.parametrize("name", REQUESTS)
