@@ -5,8 +5,9 @@ Usage: python benchmarks/bench_soak.py [SECONDS]
 
 1 kHz of wrenches of which 1 % are bad, four clients whose answers are checked against the
 library, and a reload each second. Then the topic path under two loads and with both executors,
-beside a node with empty handlers: what is late there, too, is not late because of ours. The exit
-code is 1 if an answer was lost or wrong.
+beside a node with empty handlers: what is late there, too, is not late because of ours. Then the
+hard cases of soak_hard.py; with `hard` in place of SECONDS these alone. The exit code is 1 if an
+answer was lost or wrong, or a goal of a hard case missed.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from concurrent.futures import ProcessPoolExecutor
 from typing import TYPE_CHECKING
 
 import numpy as np
+import soak_hard
 import soak_load
 from ament_index_python.packages import get_package_share_directory
 from node_processes import BARE, OURS, isolate, process, processor_seconds, resident
@@ -40,13 +42,16 @@ LOADS = {"4 clients in closed loops": 0.0, "4 clients at 50 calls/s each": 0.02}
 class Load:
     """Processes that load a node.
 
+    Attributes:
+        pool: The processes.
+
     Args:
         model_file: What our node answers by.
     """
 
     def __init__(self, model_file: str) -> None:
         """Start them."""
-        self._pool = ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn"))
+        self.pool = ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn"))
         self._model_file = model_file
 
     def run(
@@ -59,10 +64,10 @@ class Load:
             resident memory [kB] after warming up and at the end.
         """
         ours = prefix != "/bare"
-        calls = self._pool.submit(
+        calls = self.pool.submit(
             soak_load.call, prefix, seconds, period, CLIENTS, self._model_file if ours else None
         )
-        stream = self._pool.submit(
+        stream = self.pool.submit(
             soak_load.stream, prefix, seconds, self._model_file if ours else None
         )
         warm_up = min(WARM_UP, seconds / 4)
@@ -104,7 +109,8 @@ def soak(load: Load, prefix: str, node: subprocess.Popen[bytes], seconds: float)
 
 def main() -> int:
     """Load the nodes and print what became of it."""
-    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else SECONDS
+    only_hard = sys.argv[1:] == ["hard"]
+    seconds = float(sys.argv[1]) if sys.argv[1:] and not only_hard else SECONDS
     isolate()
     share = get_package_share_directory("limit_surface_ros")
     load = Load(f"{share}/config/models/{MODEL}.yaml")
@@ -115,6 +121,9 @@ def main() -> int:
         "ours, `executor: events`": ("/with_events", events),
         "empty handlers": ("/bare", BARE),
     }
+    if only_hard:
+        with process(ours) as node:
+            return 0 if hard_cases(load, "/limit_surface", node) else 1
     with contextlib.ExitStack() as stack:
         nodes = {
             name: (prefix, stack.enter_context(process(command)))
@@ -133,7 +142,24 @@ def main() -> int:
                 print(f"| {stream.answered / stream.sent:.1%} ", end="")
                 print(f"| {milliseconds(stream.delays)} | {milliseconds(calls.times)} ", end="")
                 print(f"| {used:.2f} |")
+        right = hard_cases(load, *nodes["ours"]) and right
     return 0 if right else 1
+
+
+def hard_cases(load: Load, prefix: str, node: subprocess.Popen[bytes]) -> bool:
+    """Print the table of hard cases; return whether each goal was met."""
+    print("\n### Hard cases\n\n| case | seen | goal |\n|---|---|---|", flush=True)
+    met = True
+    for case in (
+        lambda: soak_hard.long_batches(load.pool, prefix, 2.0 * ROW_SECONDS),
+        lambda: soak_hard.many_clients(load.pool, prefix, ROW_SECONDS),
+        lambda: soak_hard.stopped_client(load.pool, prefix, node),
+        lambda: soak_hard.moving_frame(load.pool, ROW_SECONDS),
+    ):
+        row, good = case()
+        print(row, flush=True)
+        met = met and good
+    return met
 
 
 if __name__ == "__main__":

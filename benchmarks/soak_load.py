@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import contextlib
 import math
+import sys
 import time
+from array import array
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rclpy
 from geometry_msgs.msg import TwistStamped, WrenchStamped
-from limit_surface_interfaces.srv import WrenchToTwist
+from limit_surface_interfaces.srv import WrenchesToTwists, WrenchToTwist
 from node_processes import wrench_message
 from rclpy.experimental import EventsExecutor
 from rclpy.qos import QoSProfile
@@ -217,3 +219,88 @@ def _reloads(client: Any, total: Calls) -> Callable[[], None]:
         total.reloads += done.result().success
 
     return lambda: client.call_async(Trigger.Request()).add_done_callback(count)
+
+
+def moving_stream(prefix: str, seconds: float) -> Stream:
+    """Send wrenches stamped now in a moving frame, and time the twists."""
+    seen = Stream()
+    due: dict[tuple[int, int], float] = {}
+
+    def take(message: TwistStamped) -> None:
+        stamp = message.header.stamp
+        start = due.pop((stamp.sec, stamp.nanosec), None)
+        if start is not None:
+            seen.answered += 1
+            seen.delays.append(time.perf_counter() - start)
+
+    with _spinning("soak_moving", seconds + 1.0) as node:
+
+        def send() -> None:
+            if time.perf_counter() > end:
+                return
+            message = wrench_message(WRENCH, "tool")
+            message.header.stamp = node.get_clock().now().to_msg()
+            due[message.header.stamp.sec, message.header.stamp.nanosec] = time.perf_counter()
+            seen.sent += 1
+            publisher.publish(message)
+
+        node.create_subscription(TwistStamped, f"{prefix}/predicted_twist", take, 100)
+        publisher = node.create_publisher(WrenchStamped, f"{prefix}/wrench", 100)
+        while not publisher.get_subscription_count():
+            time.sleep(0.01)
+        while not node.count_publishers(f"{prefix}/predicted_twist"):
+            time.sleep(0.01)
+        time.sleep(1.0)
+        end = time.perf_counter() + seconds
+        node.create_timer(1.0 / 200.0, send)
+    return seen
+
+
+def batches(prefix: str, seconds: float, rows: int) -> Calls:
+    """Ask for batches in a closed loop for so long."""
+    return _batches(prefix, rows, lambda calls, start: time.perf_counter() - start < seconds)
+
+
+def batch_calls(prefix: str, count: int, rows: int) -> Calls:
+    """Ask for so many batches in a closed loop."""
+    return _batches(prefix, rows, lambda calls, _: len(calls.times) + calls.lost < count)
+
+
+def _batches(prefix: str, rows: int, go_on: Callable[[Calls, float], bool]) -> Calls:
+    calls = Calls()
+    flat = array("d", np.random.default_rng(0).normal(size=3 * rows))
+    request = WrenchesToTwists.Request(wrenches=flat)
+    with rclpy.Context() as context:
+        node = rclpy.create_node("soak_batches", context=context)
+        client = node.create_client(
+            WrenchesToTwists, f"{prefix}/wrenches_to_twists", qos_profile=DEEP
+        )
+        client.wait_for_service()
+        executor = EventsExecutor(context=context)
+        executor.add_node(node)
+        start = time.perf_counter()
+        while go_on(calls, start):
+            asked = time.perf_counter()
+            future = client.call_async(request)
+            executor.spin_until_future_complete(future, timeout_sec=10.0 * LOST)
+            if future.done():
+                calls.times.append(time.perf_counter() - asked)
+            else:
+                calls.lost += 1
+        executor.shutdown()
+        node.destroy_node()
+    return calls
+
+
+def _wait_to_be_stopped(name: str) -> None:
+    """Be a client of a service that takes no answers."""
+    rclpy.init()
+    node = rclpy.create_node("soak_stopped")
+    client = node.create_client(WrenchesToTwists, name)
+    client.wait_for_service()
+    print("ready", flush=True)
+    time.sleep(3600.0)
+
+
+if __name__ == "__main__":
+    _wait_to_be_stopped(sys.argv[1])
