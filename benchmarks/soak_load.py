@@ -39,6 +39,8 @@ WRENCH = (2.0, 1.0, 0.05)
 BAD = 100
 # After so long an answer counts as lost [s].
 LOST = 5.0
+# A stream ends so long before its load does [s].
+LAST = 0.5
 # Every client of a service hears all of its answers; few would push its own out.
 DEEP = QoSProfile(depth=1000)
 
@@ -119,6 +121,9 @@ def stream(prefix: str, seconds: float, model_file: str | None) -> Stream:
             seen.delays.append(time.perf_counter() - start)
 
     def send() -> None:
+        # What is sent last may still be under way when the load ends.
+        if time.perf_counter() > end:
+            return
         number = seen.sent + seen.bad
         message = wrench_message(WRENCH)
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(number, 1000)
@@ -131,10 +136,11 @@ def stream(prefix: str, seconds: float, model_file: str | None) -> Stream:
         publisher.publish(message)
 
     with _spinning("soak_stream", seconds) as node:
-        node.create_subscription(TwistStamped, f"{prefix}/predicted_twist", take, 100)
-        publisher = node.create_publisher(WrenchStamped, f"{prefix}/wrench", 100)
+        node.create_subscription(TwistStamped, f"{prefix}/predicted_twist", take, DEEP)
+        publisher = node.create_publisher(WrenchStamped, f"{prefix}/wrench", DEEP)
         while not publisher.get_subscription_count():
             time.sleep(0.01)
+        end = time.perf_counter() + seconds - LAST
         node.create_timer(1.0 / RATE, send)
     return seen
 
@@ -244,8 +250,8 @@ def moving_stream(prefix: str, seconds: float) -> Stream:
             seen.sent += 1
             publisher.publish(message)
 
-        node.create_subscription(TwistStamped, f"{prefix}/predicted_twist", take, 100)
-        publisher = node.create_publisher(WrenchStamped, f"{prefix}/wrench", 100)
+        node.create_subscription(TwistStamped, f"{prefix}/predicted_twist", take, DEEP)
+        publisher = node.create_publisher(WrenchStamped, f"{prefix}/wrench", DEEP)
         while not publisher.get_subscription_count():
             time.sleep(0.01)
         while not node.count_publishers(f"{prefix}/predicted_twist"):

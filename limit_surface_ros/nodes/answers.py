@@ -48,13 +48,19 @@ class FiniteCheck:
     Args:
         message_type: Type of the messages.
         unbounded: Fields that may be infinite, by their dotted names: "forever" is an answer.
+        checked: Fields that were looked at when they were filled, slice by slice.
     """
 
-    def __init__(self, message_type: Any, unbounded: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self,
+        message_type: Any,
+        unbounded: tuple[str, ...] = (),
+        checked: tuple[str, ...] = (),
+    ) -> None:
         """Find the fields that hold numbers."""
         numbers, arrays = _float_fields(message_type)
         self._names = [name for name in numbers if name not in unbounded]
-        self._arrays = [name for name in arrays if name not in unbounded]
+        self._arrays = [name for name in arrays if name not in (*unbounded, *checked)]
         self._unbounded = [name for name in unbounded if name in numbers]
         self._unbounded_arrays = [name for name in unbounded if name in arrays]
         self._numbers = _getter(self._names)

@@ -100,6 +100,6 @@ def empty_rows(rows: int, columns: int) -> tuple[array[float], Floats]:
 
     `array.array` is the one type that rclpy takes without looking at each element.
     """
-    flat = array("d", bytes(8 * rows * columns))
+    flat = array("d", (0.0,)) * (rows * columns)
     view = np.frombuffer(flat, dtype=np.float64) if rows else np.empty(0)
     return flat, view.reshape((rows, columns) if columns > 1 else (rows,))

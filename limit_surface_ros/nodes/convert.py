@@ -15,6 +15,7 @@ from limit_surface_ros.errors import (
     NotFiniteError,
     RangeError,
     ShapeError,
+    SolverError,
     ZeroVectorError,
 )
 
@@ -155,6 +156,23 @@ def _bad_row(where: str, row: list[float]) -> LimitSurfaceError:
     if not any(row):
         return ZeroVectorError(f"{where} must not be zero: it has no direction")
     return RangeError(f"{where} must be within {SMALLEST:g} and {LARGEST:g} in size, got {row}")
+
+
+def finite_rows(name: str, values: Floats, first: int = 0) -> Floats:
+    """Return a part of an answer's rows or numbers, all of which are finite.
+
+    Args:
+        name: Name of the field.
+        values: Shape (n, 3) or (n,).
+        first: Number of the first of them in the field.
+
+    Raises:
+        SolverError: A number is NaN or infinite; the error names its row.
+    """
+    if not math.isfinite(values.sum()) and not np.isfinite(values).all():
+        rows = np.isfinite(values).reshape(len(values), -1).all(axis=1)
+        raise SolverError(f"no finite answer was found: {name} row {first + int(np.argmin(rows))}")
+    return values
 
 
 def flat_of(values: Floats) -> array[float]:

@@ -36,9 +36,10 @@ if TYPE_CHECKING:
 
 LOG_PERIOD = 5.0
 DEPTH = 10
-# Messages of a stream that wait while one answer leaves or one long request comes in: 1 kHz for a
-# fifth of a second.
-STREAM_DEPTH = 200
+# Messages of a stream, and answers to them, that wait while a long request comes in or a busy
+# machine has no time: a second of 1 kHz. So many are taken in a turn.
+STREAM_DEPTH = 1000
+TAKEN_IN_A_TURN = 100
 # Requests that wait while one is answered: of more than the usual 10 the oldest would be lost.
 WAITING = 1000
 # The same of services whose replies are large: 64 answers to 10 000 rows are 20 MB.
@@ -86,6 +87,8 @@ class Service(NamedTuple):
         unbounded: Fields of the response that may be infinite, by their dotted names.
         depth: How many requests may wait to be taken, and how many replies are kept for clients
             that are slow to take them or have stopped: few where replies are large.
+        checked: Fields that the handler has filled by `convert.finite_rows`: they may be long, and
+            are not looked at again.
     """
 
     type: Any
@@ -93,6 +96,7 @@ class Service(NamedTuple):
     handler: Callable[[Any, Any, Any], Any]
     unbounded: tuple[str, ...] = ()
     depth: int = WAITING
+    checked: tuple[str, ...] = ()
 
 
 class Output(NamedTuple):
@@ -149,7 +153,7 @@ class Endpoints:
 
     def serve(self, service: Service) -> None:
         """Serve `~/name`."""
-        check = answers.FiniteCheck(service.type.Response, service.unbounded)
+        check = answers.FiniteCheck(service.type.Response, service.unbounded, service.checked)
 
         def refused(error: Exception, sentence: str) -> Any:
             # Nothing of a half-filled answer may be taken for one.
@@ -240,7 +244,7 @@ class Endpoints:
             self._take(name, handler, message)
             # An executor takes one message each time that it waits, and waiting costs it more than
             # a message: under load the queue would stay full, and each message wait for all of it.
-            for _ in range(STREAM_DEPTH - 1):
+            for _ in range(TAKEN_IN_A_TURN - 1):
                 taken = subscription.handle.take_message(message_type, False)
                 if taken is None:
                     break

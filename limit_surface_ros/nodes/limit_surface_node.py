@@ -29,7 +29,7 @@ from limit_surface_ros.nodes import (
     surface_markers,
 )
 from limit_surface_ros.nodes.batches import Batches, empty_rows
-from limit_surface_ros.nodes.endpoints import WAITING_LARGE, Service
+from limit_surface_ros.nodes.endpoints import STREAM_DEPTH, WAITING_LARGE, Service
 from limit_surface_ros.nodes.frames import Frames
 from limit_surface_ros.nodes.model_host import model_settings
 from limit_surface_ros.nodes.model_info import ModelList
@@ -95,8 +95,12 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
         self.batches = Batches(self.endpoints)
         self.markers = SurfaceMarkers(self, self._present)
         self.push_markers = PushMarkers(self)
-        self._twists = self.endpoints.add_output(TwistStamped, "predicted_twist")
-        self._wrenches = self.endpoints.add_output(WrenchStamped, "required_wrench")
+        self._twists = self.endpoints.add_output(
+            TwistStamped, "predicted_twist", depth=STREAM_DEPTH
+        )
+        self._wrenches = self.endpoints.add_output(
+            WrenchStamped, "required_wrench", depth=STREAM_DEPTH
+        )
         for service in (*SERVICES, *push_services.SERVICES):
             self.endpoints.serve(service)
         self.endpoints.add_input(WrenchStamped, "wrench", self._predict)
@@ -189,8 +193,10 @@ async def wrenches_to_twists(
     def work(part: slice) -> None:
         wrenches = convert.checked_rows("wrenches", rows[part], part.start)
         wrenches = wrenches if there is None else wrenches @ there
-        found, factors[part] = surface.twist_and_load_factor(wrenches)
-        twists[part] = found if back is None else found @ back
+        found, found_factors = surface.twist_and_load_factor(wrenches)
+        found = found if back is None else found @ back
+        twists[part] = convert.finite_rows("twists", found, part.start)
+        factors[part] = convert.finite_rows("load_factors", found_factors, part.start)
 
     await node.batches.run(len(rows), work)
     response.twists, response.load_factors = flat_twists, flat_factors
@@ -215,8 +221,9 @@ async def twists_to_wrenches(
         twists = convert.checked_rows("twists", rows[part], part.start)
         twists = twists if there is None else twists @ there
         found = surface.wrench_of_twist(twists)
-        powers[part] = power(found, twists)
-        wrenches[part] = found if back is None else found @ back
+        powers[part] = convert.finite_rows("powers", power(found, twists), part.start)
+        found = found if back is None else found @ back
+        wrenches[part] = convert.finite_rows("wrenches", found, part.start)
 
     await node.batches.run(len(rows), work)
     response.wrenches, response.powers = flat_wrenches, flat_powers
@@ -240,8 +247,20 @@ async def push_at_a_point(
 SERVICES = (
     Service(WrenchToTwist, "wrench_to_twist", wrench_to_twist),
     Service(TwistToWrench, "twist_to_wrench", twist_to_wrench),
-    Service(WrenchesToTwists, "wrenches_to_twists", wrenches_to_twists, depth=WAITING_LARGE),
-    Service(TwistsToWrenches, "twists_to_wrenches", twists_to_wrenches, depth=WAITING_LARGE),
+    Service(
+        WrenchesToTwists,
+        "wrenches_to_twists",
+        wrenches_to_twists,
+        depth=WAITING_LARGE,
+        checked=("twists", "load_factors"),
+    ),
+    Service(
+        TwistsToWrenches,
+        "twists_to_wrenches",
+        twists_to_wrenches,
+        depth=WAITING_LARGE,
+        checked=("wrenches", "powers"),
+    ),
     Service(Push, "push", push_at_a_point),
     Service(ListModels, "list_models", LimitSurfaceNode.list_models),
     Service(DescribeModel, "describe_model", LimitSurfaceNode.describe_model),

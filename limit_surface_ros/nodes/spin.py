@@ -28,6 +28,7 @@ from rclpy.utilities import remove_ros_args
 
 from limit_surface_ros.errors import FileError, LimitSurfaceError, RangeError
 from limit_surface_ros.nodes.settings import Setting, help_of
+from limit_surface_ros.runtime import keep_large_pieces
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -90,6 +91,7 @@ def run(
     """
     _open_standard_streams()
     sys.setswitchinterval(SWITCH_INTERVAL)
+    keep_large_pieces()
     # Whichever thread the kernel picks (OpenBLAS has some of its own), Python writes to this end.
     woken, wakes = socket.socketpair()
     wakes.setblocking(False)
