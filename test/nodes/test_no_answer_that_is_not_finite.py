@@ -130,7 +130,9 @@ def test_services_of_decays_say_so_too(
     bench = Bench(ros, client_node, tmp_path, sim_time=False)
     call = ros.client(client_node, kind, f"/decay/{name}")
     monkeypatch.setattr(
-        type(bench.node.host.models[""].sum), "__call__", lambda _, times: np.full(len(times), math.nan)
+        type(bench.node.host.models[""].sum),
+        "__call__",
+        lambda _, times: np.full(len(times), math.nan),
     )
     assert call(request_).error_code == ErrorCode.NO_CONVERGENCE
 
