@@ -39,6 +39,8 @@ TOPICS = {
         "value_topic": "~/value",
         "forecast_topic": "~/forecast",
         "time_left_topic": "~/time_left",
+        "held_wrench_topic": "~/held_wrench",
+        "required_normal_force_topic": "~/required_normal_force",
     },
 }
 SHARED_TOPICS = {"tf_topic": "/tf", "tf_static_topic": "/tf_static"}
