@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -28,10 +28,13 @@ __all__ = [
     "OVERLAPS",
     "PushRun",
     "PushRuns",
+    "push_run_steps",
     "push_steps",
     "simulate_push",
     "simulate_pushes",
 ]
+
+Found = TypeVar("Found")
 
 DEFAULT_ACCURACY = 1e-5
 # Accuracy that double precision still gives [m], and the coarsest that makes sense.
@@ -90,9 +93,37 @@ def simulate_push(
         >>> square = Polygon([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
         >>> body = PowerSum.thesis([np.eye(3)])
         >>> run = simulate_push(body, square, 0.1, 0.3, [0, 0, 0], [[-1, 0], [0, 0]])
-        >>> np.round(run.end_pose, 6).tolist()
+        >>> (np.round(run.end_pose, 6) + 0.0).tolist()
         [0.6, 0.0, 0.0]
     """
+    return _last(
+        push_run_steps(
+            surface,
+            outline,
+            tip_radius,
+            friction,
+            pose,
+            path,
+            accuracy=accuracy,
+            overlap=overlap,
+            reference_point=reference_point,
+        )
+    )
+
+
+def push_run_steps(
+    surface: LimitSurface,
+    outline: Outline,
+    tip_radius: float,
+    friction: float,
+    pose: ArrayLike,
+    path: ArrayLike,
+    *,
+    accuracy: float = DEFAULT_ACCURACY,
+    overlap: str = "keep",
+    reference_point: ArrayLike = (0.0, 0.0),
+) -> Generator[None, None, PushRun]:
+    """Do as `simulate_push`, but in steps of about a millisecond; see `push_steps`."""
     given, way = as_floats("pose", pose), as_floats("path", path)
     if given.shape != (3,):
         raise ShapeError(f"pose must be x, y and an angle, got shape {given.shape}")
@@ -100,8 +131,7 @@ def simulate_push(
         raise ShapeError(f"path must have shape (m, 2), got {way.shape}")
     batch = _Batch(surface, outline, tip_radius, friction, accuracy, overlap, reference_point)
     (rollout,) = batch.blocks(given[np.newaxis], way[np.newaxis], record=True)
-    for _ in rollout.rounds():
-        pass
+    yield from rollout.rounds()
     steps = rollout.recorded
     twists, modes, wrenches, contacts = rollout.outcomes(steps)
     touched, left = float(rollout.touched_at[0]), float(rollout.left_at[0])
@@ -150,23 +180,19 @@ def simulate_pushes(
     Raises:
         ShapeError, NotFiniteError, RangeError, OutlineError, SolverError: As `simulate_push`.
     """
-    steps = push_steps(
-        surface,
-        outline,
-        tip_radius,
-        friction,
-        poses,
-        paths,
-        accuracy=accuracy,
-        overlap=overlap,
-        reference_point=reference_point,
+    return _last(
+        push_steps(
+            surface,
+            outline,
+            tip_radius,
+            friction,
+            poses,
+            paths,
+            accuracy=accuracy,
+            overlap=overlap,
+            reference_point=reference_point,
+        )
     )
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            found: PushRuns = end.value
-            return found
 
 
 def push_steps(
@@ -202,6 +228,16 @@ def push_steps(
             for name in ("poses", "touched_at", "left_at", "errors", "evaluations")
         )
     )
+
+
+def _last(steps: Generator[None, None, Found]) -> Found:
+    """Return what a generator does in the end."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            found: Found = end.value
+            return found
 
 
 class _Batch:

@@ -18,8 +18,8 @@ from limit_surface_ros.motion.outline import Polygon
 from limit_surface_ros.motion.rollout import (
     DEFAULT_ACCURACY,
     OVERLAPS,
+    push_run_steps,
     push_steps,
-    simulate_push,
 )
 from limit_surface_ros.nodes import convert
 from limit_surface_ros.nodes.endpoints import Service
@@ -27,6 +27,8 @@ from limit_surface_ros.nodes.planar_input import wrench_at_origin
 from limit_surface_ros.surface.frames import RigidTransform
 
 if TYPE_CHECKING:
+    from collections.abc import Generator
+
     from geometry_msgs.msg import Pose
     from nav_msgs.msg import Path
 
@@ -40,6 +42,8 @@ MOST_POSES = 1000
 MOST_PUSHES = 100_000
 # Time between turns of others [s].
 TURN = 0.003
+# Accuracy that is still answered [m]: each thousandth costs ten times as long.
+FINEST = 1e-9
 # How far the z axis of a pose may lean, as a cosine.
 UPRIGHT = 0.999
 # What `Push`, `SimulatePush` and the core call the modes.
@@ -53,17 +57,18 @@ async def simulate_one(
     model = node.host.models[request.model]
     tips, stamps = _tips(request)
     outline = outline_of(model, request)
-    run = simulate_push(
+    steps = push_run_steps(
         node.input.policy.surface_of(model),
         outline,
         request.tip_radius,
         request.friction,
         _planar_pose(request.start),
         tips,
-        accuracy=request.accuracy or DEFAULT_ACCURACY,
+        accuracy=_accuracy(request.accuracy),
         overlap=_overlap(request.overlap),
         reference_point=model.reference_point,
     )
+    run = await _with_turns(node, steps)
     first = convert.nanoseconds(request.header.stamp)
     if stamps is None:
         times = np.zeros(len(run.path_lengths))
@@ -111,20 +116,11 @@ async def simulate_many(
         request.friction,
         poses,
         np.stack([starts, ends], axis=1),
-        accuracy=request.accuracy or DEFAULT_ACCURACY,
+        accuracy=_accuracy(request.accuracy),
         overlap=_overlap(request.overlap),
         reference_point=model.reference_point,
     )
-    begin = time.perf_counter()
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            runs = end.value
-            break
-        if time.perf_counter() - begin > TURN:
-            await node.endpoints.give_way()
-            begin = time.perf_counter()
+    runs = await _with_turns(node, steps)
     answer = SimulatePushes.Response
     outcomes = np.where(np.isnan(runs.left_at), answer.TOUCHES, answer.LEAVES)
     outcomes = np.where(np.isnan(runs.touched_at), answer.MISSES, outcomes)
@@ -132,6 +128,30 @@ async def simulate_many(
     response.end_poses = convert.flat_of(runs.end_poses)
     response.outcomes = array("B", outcomes.astype(np.uint8).tobytes())
     response.estimated_errors = convert.flat_of(runs.errors)
+
+
+async def _with_turns(node: Any, steps: Generator[None, None, Any]) -> Any:
+    """Return what steps lead to; others have their turns in between."""
+    begin = time.perf_counter()
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            return end.value
+        if time.perf_counter() - begin > TURN:
+            await node.endpoints.give_way()
+            begin = time.perf_counter()
+
+
+def _accuracy(asked: float) -> float:
+    """Return the accuracy that is asked for, or the usual one.
+
+    Raises:
+        RangeError: It would take the node too long.
+    """
+    if 0.0 < asked < FINEST:
+        raise RangeError(f"accuracy must be {FINEST:g} m or more, or 0, got {asked}")
+    return asked or DEFAULT_ACCURACY
 
 
 def outline_of(model: SurfaceModel, request: Any) -> Outline:

@@ -210,7 +210,8 @@ def set_to(name, value):
         (set_to("friction", -0.1), "OUT_OF_RANGE", "friction"),
         (set_to("friction", float("nan")), "OUT_OF_RANGE", "friction"),
         (set_to("accuracy", -1e-5), "OUT_OF_RANGE", "accuracy"),
-        (set_to("accuracy", 1e-30), "OUT_OF_RANGE", "accuracy"),
+        (set_to("accuracy", 1e-10), "OUT_OF_RANGE", "accuracy"),
+        (set_to("accuracy", float("nan")), "OUT_OF_RANGE", "accuracy"),
         (set_to("overlap", 7), "OUT_OF_RANGE", "overlap"),
     ],
 )
