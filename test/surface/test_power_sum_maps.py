@@ -51,6 +51,15 @@ def test_loads_divided_by_their_factor_are_on_the_surface(seed):
     np.testing.assert_allclose(surface.value(on_surface / SCALING.wrench_unit), 1.0, rtol=1e-12)
 
 
+def test_the_value_of_a_load_keeps_its_digits_where_forms_are_small():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        surface = random_surface(rng, 0.05, terms=3, spread=4.0)
+        loads = rng.standard_normal((2000, 3))
+        on_surface = loads / surface.load_factor(loads)[:, np.newaxis] / SCALING.wrench_unit
+        np.testing.assert_allclose(surface.value(on_surface), 1.0, rtol=1e-12)
+
+
 @given(seeds)
 def test_scale_and_normals_are_homogeneous_and_symmetric(seed):
     rng = np.random.default_rng(seed)

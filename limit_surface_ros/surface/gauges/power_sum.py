@@ -32,20 +32,20 @@ class PowerSumGauge:
 
     def values(self, loads: Floats) -> Floats:
         """Return g (m,); 0 for a load that nothing limits."""
-        return self._scale.load_factors(self._images_and_forms(loads)[1])
+        return self._scale.load_factors(self.images_and_forms(loads)[1])
 
     def values_and_normals(self, loads: Floats) -> tuple[Floats, Floats]:
         """Return g (m,) and vectors (3, m) along its gradient, of any length.
 
         A term adds nothing to the normal of a load in its null space.
         """
-        images, forms = self._images_and_forms(loads)
+        images, forms = self.images_and_forms(loads)
         values, weights = self._scale.load_factors_and_weights(forms)
         images *= weights[:, np.newaxis]
         normals = self._stacked_roots.T.dot(images.reshape(-1, images.shape[2]))
         return values, np.asarray(normals)
 
-    def _images_and_forms(self, loads: Floats) -> tuple[Floats, Floats]:
+    def images_and_forms(self, loads: Floats) -> tuple[Floats, Floats]:
         """Return R_i f, shape (k, 3, m), and f' A_i f, shape (k, m)."""
         images = self._stacked_roots.dot(loads).reshape(-1, 3, loads.shape[1])
         forms: Floats = np.einsum("kcm,kcm->km", images, images)

@@ -13,6 +13,7 @@ from limit_surface_ros.checks import as_floats, as_vectors
 from limit_surface_ros.errors import RangeError, ShapeError
 from limit_surface_ros.surface.base import FileArray, LimitSurface
 from limit_surface_ros.surface.gauges.power_scale import power_scale
+from limit_surface_ros.surface.gauges.power_sum import PowerSumGauge
 from limit_surface_ros.surface.linalg import as_psd_matrices, null_space, of_unit_length, root_of
 from limit_surface_ros.surface.scaling import Scaling
 from limit_surface_ros.surface.shape import GaugeShape
@@ -137,8 +138,8 @@ class PowerSum(LimitSurface):
         """
         array = as_vectors("load", load)
         columns = array.reshape(-1, 3).T
-        forms = np.einsum("im,kij,jm->km", columns, self.matrices, columns)
-        values = (np.maximum(forms, 0.0) ** self.exponents[:, np.newaxis]).sum(axis=0)
+        forms = self._terms.images_and_forms(columns)[1]
+        values = (forms ** self.exponents[:, np.newaxis]).sum(axis=0)
         return np.asarray(values.reshape(array.shape[:-1]))[()]
 
     def gradient(self, load: ArrayLike) -> Floats:
@@ -155,11 +156,11 @@ class PowerSum(LimitSurface):
         """
         array = as_vectors("load", load)
         columns = array.reshape(-1, 3).T
-        images = self.matrices @ columns
-        forms = np.einsum("im,kim->km", columns, images)
+        images, forms = self._terms.images_and_forms(columns)
         exponents = self.exponents[:, np.newaxis]
         weights = np.power(forms, exponents - 1.0, out=np.zeros_like(forms), where=forms > 0.0)
-        gradient = np.einsum("km,kim->mi", 2.0 * exponents * weights, images)
+        images *= (2.0 * exponents * weights)[:, np.newaxis]
+        gradient = np.einsum("kci,kcm->mi", self._roots, images)
         return np.asarray(gradient.reshape(array.shape))
 
     def gradient_twist(self, wrench: ArrayLike) -> Floats:
@@ -186,10 +187,17 @@ class PowerSum(LimitSurface):
             return "every exponent is at least 1/2, so that every term is convex"
         return None
 
+    @cached_property
+    def _roots(self) -> Floats:
+        """The R_i with R_i' R_i = A_i: they keep twice the digits where a form is small."""
+        return np.array([root_of(matrix) for matrix in self.matrices])
+
+    @cached_property
+    def _terms(self) -> PowerSumGauge:
+        return PowerSumGauge(self._roots, self.exponents)
+
     def _new_shape(self) -> _PowerSumShape:
-        return _PowerSumShape(
-            np.array([root_of(matrix) for matrix in self.matrices]), self.exponents
-        )
+        return _PowerSumShape(self._roots, self.exponents)
 
 
 class _PowerSumShape(GaugeShape):
