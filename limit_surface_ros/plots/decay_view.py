@@ -95,7 +95,10 @@ def _draw_error(axes: Axes, model: DecayModel, target: Target | None, times: Flo
 
 def _outliers(model: DecayModel, samples: Floats) -> Floats:
     """Return the samples' times that the model file names as outliers."""
-    named = np.atleast_1d(np.asarray(model.fit.get("outlier_times", []), dtype=np.float64))
+    # What stands in a file's `fit` may be anything.
+    stated = model.fit.get("outlier_times", [])
+    times = stated if isinstance(stated, list) else []
+    named = np.array([time for time in times if isinstance(time, (int, float))], dtype=np.float64)
     nearest = np.abs(np.subtract.outer(named, samples)) if len(named) else np.zeros((0, 1))
     # Times from a file may have gone through text.
     outliers: Floats = samples[np.unique(nearest.argmin(axis=1))] if len(named) else named

@@ -213,7 +213,7 @@ def run(options: argparse.Namespace) -> None:
         Compared(
             path.stem if stems.count(path.stem) == 1 else str(path),
             model.surface,
-            model.fit.get("wall_time_s"),
+            stated_time(model),
             model.fit.get("bootstrap"),
         )
         for path, model in stored.items()
@@ -248,6 +248,12 @@ def stated_points(
     if data.frame_id is not None:
         stated.insert(0, About(path, data.frame_id, data.reference_point))
     return stated
+
+
+def stated_time(model: SurfaceModel) -> float | None:
+    """Return what a model file states that its fit took [s]; what stands there may be anything."""
+    value = model.fit.get("wall_time_s")
+    return float(value) if isinstance(value, (int, float)) else None
 
 
 def print_table(rows: list[list[str]]) -> None:
