@@ -109,10 +109,10 @@ SETTINGS = (
 
 
 class DecayNode(ModelNode[DecayModel]):
-    """Publishes how an onset dies away, corrects it by measurements, predicts when sliding stops.
+    """Publishes how an onset dies away, corrects it by measurements, and tells what slides by it.
 
     Attributes:
-        surfaces: Limit surfaces of the bodies whose stop is predicted.
+        surfaces: Limit surfaces of bodies that slide and of grips.
         input: Messages as these surfaces take them.
         batches: Runs what takes long.
         onset: The last onset that came, running or over; None before the first.
