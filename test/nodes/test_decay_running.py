@@ -257,6 +257,8 @@ def test_a_program_learns_answers_and_writes(ros, client_node, tmp_path, name):
     folder.mkdir()
     path = write_decay(tmp_path, "fading", FADING, 0.001)
     arguments = ["-p", f"model_files:=['{path}']", "-p", f"learnt_folder:={folder}"]
+    # Running for half a minute, so that a busy machine has not come to its end meanwhile.
+    arguments += ["-p", "stop_below:=1.0e-12"]
     with Program("decay_node", "--ros-args", *arguments) as program:
         forecasts = ros.listen(client_node, DecayForecast, "/decay/forecast", LATCHED)
         left = ros.listen(client_node, TimeLeft, "/decay/time_left", QoSProfile(depth=1000))
