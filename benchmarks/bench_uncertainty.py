@@ -2,9 +2,10 @@
 """How sure predicted twists are: held-out pushes in their regions, and the density they had.
 
 The sets and splits of `bench_real_pushes`. "auto" is the distribution that `--auto` stores, whose
-constants were fitted once to 32 sets; "constant" a Gaussian of one covariance from the same folds'
-residuals; GP a Gaussian process of the residuals about f / |f| (scikit-learn, if it is there). A
-set's share is the mean over its splits. Densities are per steradian, as negative logarithms.
+constants were fitted once to 32 sets; "constant of training" a Gaussian of one covariance from the
+training residuals; GP a Gaussian process of the residuals about f / |f| (scikit-learn, if it is
+there). A set's share is the mean over its splits. Densities are per steradian, as negative
+logarithms.
 """
 
 from __future__ import annotations

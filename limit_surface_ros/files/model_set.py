@@ -79,6 +79,11 @@ class ModelSet(Generic[Model]):
         """Return the number of models."""
         return len(self._models)
 
+    def joined(self, models: Iterable[Model]) -> ModelSet[Model]:
+        """Return a set with these models behind; one of the same name takes the other's place."""
+        more = {model.name: model for model in models}
+        return ModelSet({**self._models, **more}, self.default, self._noun)
+
     def listed(self) -> str:
         """Return the names of the models for people: the first few, and how many more."""
         names = [shortened(name, _NAME) for name in islice(self._models, _LISTED)]

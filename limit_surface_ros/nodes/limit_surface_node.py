@@ -6,7 +6,7 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING, Any
 
-from geometry_msgs.msg import TwistStamped, WrenchStamped
+from geometry_msgs.msg import TwistStamped, TwistWithCovarianceStamped, WrenchStamped
 from limit_surface_interfaces.srv import (
     DescribeModel,
     ListModels,
@@ -22,6 +22,7 @@ from limit_surface_ros.motion.push import ContactMode, push
 from limit_surface_ros.nodes import (
     convert,
     frames,
+    learning,
     model_info,
     planar_input,
     push_services,
@@ -36,6 +37,7 @@ from limit_surface_ros.nodes.model_info import ModelList
 from limit_surface_ros.nodes.model_node import COMMON_SETTINGS, ModelNode
 from limit_surface_ros.nodes.planar_input import (
     PlanarInput,
+    covariance_at_origin,
     prepare_surface,
     rows_at_origin,
     twist_at_origin,
@@ -45,11 +47,14 @@ from limit_surface_ros.nodes.push_markers import PushMarkers
 from limit_surface_ros.nodes.settings import Setting
 from limit_surface_ros.nodes.surface_markers import SurfaceMarkers
 from limit_surface_ros.surface.frames import power
+from limit_surface_ros.surface.kinds.dissipation_scatter import region_quantile
 
 if TYPE_CHECKING:
     from limit_surface_ros.surface.base import LimitSurface
 
 NAME = "limit_surface"
+# Of the region whose half-axes are answered, where a request asks for none.
+PROBABILITY = 0.9
 SETTINGS = (
     *model_settings("config/models", "limit surfaces"),
     Setting(
@@ -60,6 +65,7 @@ SETTINGS = (
         maximum=10_000_000,
     ),
     *frames.SETTINGS,
+    *learning.SETTINGS,
     *planar_input.SETTINGS,
     *surface_markers.SETTINGS,
 )
@@ -77,6 +83,7 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
     Attributes:
         input: Messages as its surfaces take them.
         batches: Runs what takes long.
+        learner: Learns a model, None if the parameters do not ask for it.
 
     Args:
         buffer: What transforms are looked up in, in place of a tf2 buffer of the node's own.
@@ -89,6 +96,8 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
 
     def __init__(self, *, buffer: Any = None, **options: Any) -> None:
         """Read the models and start serving."""
+        # What describes the node asks for it before there is one.
+        self.learner: learning.Learner | None = None
         super().__init__(NAME, SETTINGS, read_surface_model, prepare_surface, **options)
         self._list = ModelList(self._info)
         self.input = PlanarInput(self.values, Frames(self, self.values, buffer), self.report)
@@ -98,6 +107,9 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
         self._twists = self.endpoints.add_output(
             TwistStamped, "predicted_twist", depth=STREAM_DEPTH
         )
+        self._scattered = self.endpoints.add_output(
+            TwistWithCovarianceStamped, "predicted_twist_with_covariance", depth=STREAM_DEPTH
+        )
         self._wrenches = self.endpoints.add_output(
             WrenchStamped, "required_wrench", depth=STREAM_DEPTH
         )
@@ -105,6 +117,27 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
             self.endpoints.serve(service)
         self.endpoints.add_input(WrenchStamped, "wrench", self._predict)
         self.endpoints.add_input(TwistStamped, "twist", self._require)
+        self.learner = self._learner()
+
+    def describe(self) -> dict[str, str]:
+        """Return what diagnostics say beside counts and times."""
+        learner = self.learner.describe() if self.learner is not None else {}
+        return super().describe() | learner
+
+    def destroy_node(self) -> None:
+        """Stop learning, and the node."""
+        if self.learner is not None:
+            self.learner.close()
+        super().destroy_node()
+
+    def _learner(self) -> learning.Learner | None:
+        if not self.values["learn"]:
+            return None
+        try:
+            return learning.Learner(self)
+        except Exception:
+            super().destroy_node()
+            raise
 
     def list_models(self, _: ListModels.Request, response: ListModels.Response) -> None:
         """Answer `~/list_models`."""
@@ -131,11 +164,19 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
         surface, wrench, frame = await self.input.wrench(model, message)
         self.markers.note(model, surface, wrench, frame)
         answer = TwistStamped()
-        if surface.load_factor(wrench) >= 1.0:
+        slides = bool(surface.load_factor(wrench) >= 1.0)
+        if slides:
             twist = surface.twist_of_wrench(wrench)
             convert.fill_twist(answer.twist, twist_at_origin(model, twist))
         convert.fill_header(answer.header, message.header, frame)
         self._twists.publish(answer)
+        if model.uncertain is not None and self._scattered.get_subscription_count():
+            scattered = TwistWithCovarianceStamped(header=answer.header)
+            scattered.twist.twist = answer.twist
+            if slides:
+                covariance = model.uncertain.of_twist(wrench, twist).covariance
+                scattered.twist.covariance = covariance_at_origin(model, covariance)
+            self._scattered.publish(scattered)
 
     async def _require(self, message: TwistStamped) -> None:
         model = self.host.models[""]
@@ -160,6 +201,13 @@ async def wrench_to_twist(
     convert.fill_wrench(response.limit_wrench.wrench, limit)
     response.load_factor = float(factor)
     response.slides = bool(factor >= 1.0)
+    if model.uncertain is not None:
+        answer = model.uncertain.of_twist(wrench, twist, request.probability or PROBABILITY)
+        response.has_covariance = True
+        response.covariance = covariance_at_origin(model, answer.covariance)
+        response.half_axes = answer.half_axes
+    elif request.probability:
+        region_quantile(request.probability)
     for stamped in (response.twist, response.limit_wrench):
         convert.fill_header(stamped.header, request.wrench.header, frame)
 

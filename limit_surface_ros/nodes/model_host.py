@@ -91,8 +91,15 @@ class ModelHost(Generic[Model]):
         self._preparing: ModelSet[Model] | None = None
         self._thread: threading.Thread | None = None
         self.names = (files, default)
+        # Models that come from no file, which a reload leaves alone.
+        self._added: dict[str, Model] = {}
         self._read_last: ModelSet[Model] | None = None
         parameters.on_change(self.names, self._prepare, as_a_set=True)
+
+    def add(self, model: Model) -> None:
+        """Serve a model that comes from no file, in place of one of its name."""
+        self._added[model.name] = model
+        self.models = self.models.joined([model])
 
     @property
     def summary(self) -> str:
@@ -127,7 +134,7 @@ class ModelHost(Generic[Model]):
         self._read_last = models
 
         def apply() -> None:
-            self.models = models
+            self.models = models.joined(self._added.values())
             self._start_preparing(models)
 
         return apply

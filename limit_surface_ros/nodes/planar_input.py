@@ -88,6 +88,10 @@ SETTINGS = (
 )
 
 
+# Where (x, y, rotation about z) stand among six components.
+_PLANE = np.ix_([0, 1, 5], [0, 1, 5])
+
+
 @dataclass(frozen=True)
 class InputPolicy:
     """What the parameters say of inputs; made anew when one changes.
@@ -323,6 +327,8 @@ class PlanarInput:
 def prepare_surface(model: SurfaceModel) -> None:
     """Do ahead what the first requests would have to wait for."""
     model.surface.prepare()
+    if model.uncertain is not None:
+        model.uncertain.prepare()
 
 
 def wrench_at_origin(model: SurfaceModel, wrench: Sequence[float]) -> tuple[float, ...]:
@@ -337,6 +343,24 @@ def twist_at_origin(model: SurfaceModel, twist: Sequence[float]) -> tuple[float,
     vx, vy, omega = map(float, twist)
     x, y = model.reference_point
     return vx + omega * y, vy - omega * x, omega
+
+
+def covariance_at_origin(model: SurfaceModel, covariance: Floats) -> Floats:
+    """Return a twist's covariance at the reference point as it is at the frame's origin.
+
+    Args:
+        model: The model.
+        covariance: Of (vx, vy, omega_z), shape (3, 3).
+
+    Returns:
+        That of all six components, row-major as geometry_msgs has it, shape (36,).
+    """
+    six = np.zeros((6, 6))
+    moved = _to_reference("twist", model)
+    # Rows are multiplied from the right: to the origin it is the inverse, of opposite shifts.
+    back = 2.0 * np.eye(3) - moved
+    six[_PLANE] = back.T @ covariance @ back
+    return six.ravel()
 
 
 def rows_at_origin(what: str, model: SurfaceModel) -> Floats | None:

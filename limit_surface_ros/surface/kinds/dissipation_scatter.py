@@ -245,6 +245,21 @@ class UncertainSurface:
             half_axes=np.sqrt(quantile * values).reshape(*shape, 2),
         )
 
+    def of_twist(
+        self, wrench: ArrayLike, twist: Floats, probability: float = 0.9
+    ) -> TwistWithCovariance:
+        """Return the same of one load whose twist is known already.
+
+        Args:
+            wrench: Shape (3,), not zero; its size does not matter.
+            twist: What the model's `twist_of_wrench` makes of it, shape (3,).
+            probability: Of the region whose half-axes are asked for.
+
+        Raises:
+            RangeError: The probability is not between 0 and 1.
+        """
+        return self._looked_up(wrench, twist, region_quantile(probability))
+
     def prepare(self) -> None:
         """Make the table; later calls do not wait for it."""
         _ = self._table

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The limit_surface node learns while it serves: under its own name, saved, restored, followed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
+
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import TwistStamped, WrenchStamped
+from limit_surface_interfaces.msg import ErrorCode
+from limit_surface_interfaces.srv import ListModels, WrenchToTwist
+from std_srvs.srv import Trigger
+
+from limit_surface_ros.errors import FileError, UnknownModelError
+from limit_surface_ros.files.surface_file import (
+    SurfaceModel,
+    read_surface_model,
+    write_surface_model,
+)
+from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+from limit_surface_ros.surface.pairs import Pairs
+from limit_surface_ros.surface.sampling import random_loads
+from limit_surface_ros.surface.scaling import Scaling
+from node_helpers import planar_twist, twist_message, wrench_message
+
+SCALING = Scaling(0.08, 5.0)
+BODY = PointContacts([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]], [2.0, 1.0, 1.5], SCALING)
+SHIFTED = PointContacts([[0.0, -0.04], [0.0, 0.08], [0.12, -0.04]], [2.0, 1.0, 1.5], SCALING)
+REFERENCE = (0.02, -0.01)
+
+
+@pytest.fixture
+def prior(tmp_path):
+    """A model file of a wrong prior, about a point off its frame's origin."""
+    path = tmp_path / "prior.yaml"
+    sphere = Dissipation(np.eye(3)[None], SCALING)
+    write_surface_model(SurfaceModel("body", sphere, reference_point=REFERENCE), path)
+    return path
+
+
+class Robot:
+    """Publishes pushes of a body as measurements whose stamps are those of 100 Hz."""
+
+    def __init__(self, ros, client_node):
+        self.ros = ros
+        self.wrenches = client_node.create_publisher(
+            WrenchStamped, "/limit_surface/measured_wrench", 100
+        )
+        self.twists = client_node.create_publisher(
+            TwistStamped, "/limit_surface/measured_twist", 100
+        )
+        ros.matched(self.wrenches)
+        ros.matched(self.twists)
+        self.time = 10.0
+
+    def push(self, node, body, count, seed):
+        """Push until so many more pushes are learnt: of a lost message the push comes again."""
+        goal = node.learner.count + count
+        rng = np.random.default_rng(seed)
+        for _ in range(10 * count):
+            if node.learner.count >= goal:
+                return
+            known = node.learner.count
+            pair = random_loads(body, 1, rng)
+            motion = 0.02 * pair.twists[0] / np.linalg.norm(pair.twists[0] / SCALING.twist_unit)
+            for _ in range(8):
+                noisy = motion + 4e-4 * SCALING.twist_unit * rng.normal(size=3)
+                self.sample(pair.wrenches[0], noisy)
+            self.sample(np.zeros(3), np.zeros(3))
+            self.time += 1.0
+            try:
+                self.ros.wait(lambda known=known: node.learner.count > known, 3.0)
+            except AssertionError:
+                continue
+        assert node.learner.count >= goal
+
+    def sample(self, wrench, twist):
+        """Publish one measurement of both, at the origin of the frame."""
+        self.time += 0.01
+        stamp = Time(sec=int(self.time), nanosec=int(1e9 * (self.time % 1.0)))
+        x, y = REFERENCE
+        fx, fy, tau = wrench
+        vx, vy, omega = twist
+        self.wrenches.publish(wrench_message((fx, fy, tau + x * fy - y * fx), stamp=stamp))
+        self.twists.publish(twist_message((vx + omega * y, vy - omega * x, omega), stamp=stamp))
+
+
+def angles(call, model, test):
+    """Angles [rad] between the twists that a service answers for a model and those of pairs."""
+    found = []
+    x, y = REFERENCE
+    for (fx, fy, tau), twist in zip(test.wrenches, test.twists, strict=True):
+        wrench = wrench_message((fx, fy, tau + x * fy - y * fx))
+        answer = call(WrenchToTwist.Request(model=model, wrench=wrench))
+        assert answer.error_code == ErrorCode.NONE, answer.error_msg
+        vx, vy, omega = planar_twist(answer.twist)
+        unit = np.array([vx - omega * y, vy + omega * x, omega]) / SCALING.twist_unit
+        expected = twist / SCALING.twist_unit
+        cosine = unit @ expected / np.linalg.norm(unit) / np.linalg.norm(expected)
+        found.append(np.arccos(min(1.0, cosine)))
+    return float(np.degrees(np.mean(found)))
+
+
+def some(body):
+    pairs = random_loads(body, 25, 9)
+    return Pairs(2.0 * pairs.wrenches, pairs.twists)
+
+
+def test_predictions_improve_follow_a_change_and_outlive_the_node(
+    ros, client_node, prior, tmp_path
+):
+    saved = tmp_path / "learnt.yaml"
+    parameters = {"learn": True, "learn_file": str(saved)}
+    node = ros.add(LimitSurfaceNode, files=[prior], parameters=parameters)
+    call = ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
+    save = ros.client(client_node, Trigger, "/limit_surface/save_learnt")
+    refused = save(Trigger.Request())
+    assert not refused.success
+    assert "nothing has been learnt yet" in refused.message
+    robot = Robot(ros, client_node)
+    robot.push(node, BODY, 12, 1)
+    before, learnt = (angles(call, name, some(BODY)) for name in ("body", "body_learnt"))
+    assert learnt < 0.6 * before
+    listed = ros.client(client_node, ListModels, "/limit_surface/list_models")
+    names = [model.name for model in listed(ListModels.Request()).models]
+    assert names == ["body", "body_learnt"]
+    assert "12 pushes" in node.describe()["learning"]
+    assert "predicted within" in node.describe()["last push"]
+    # What is learnt outlives a reload, and the node.
+    reload = ros.client(client_node, Trigger, "/limit_surface/reload")
+    assert reload(Trigger.Request()).success
+    assert angles(call, "body_learnt", some(BODY)) == pytest.approx(learnt, abs=1e-6)
+    answer = save(Trigger.Request())
+    assert answer.success, answer.message
+    model = read_surface_model(saved)
+    assert (model.name, model.reference_point) == ("body_learnt", REFERENCE)
+    again = ros.add(LimitSurfaceNode, files=[prior], parameters=parameters, namespace="/again")
+    ros.wait(lambda: again.learner.count == 12)
+    # The body is another one half-way.
+    stale = angles(call, "body_learnt", some(SHIFTED))
+    robot.push(node, SHIFTED, 12, 2)
+    assert angles(call, "body_learnt", some(SHIFTED)) < 0.8 * stale
+
+
+def test_a_node_that_does_not_learn_has_no_such_topics(ros, client_node, prior):
+    node = ros.add(LimitSurfaceNode, files=[prior])
+    assert node.learner is None
+    names = {name for name, _ in node.get_topic_names_and_types()}
+    assert "/limit_surface/measured_wrench" not in names
+    assert "learning" not in node.describe()
+
+
+def test_what_learning_cannot_begin_with_is_refused(ros, prior, tmp_path):
+    with pytest.raises(UnknownModelError, match="no model 'absent'"):
+        ros.add(
+            LimitSurfaceNode, files=[prior], parameters={"learn": True, "learn_prior": "absent"}
+        )
+    with pytest.raises(FileError, match="is no learnt model"):
+        ros.add(
+            LimitSurfaceNode,
+            files=[prior],
+            parameters={"learn": True, "learn_file": str(prior)},
+        )
