@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from limit_surface_ros.files.bag_reader import Bag
 
 STATIC_TOPIC, _LONGEST_LIST = "/tf_static", 300
+# Numbers beyond this are no transforms, and their products overflow.
+_LARGEST = 1e12
 ACCEPTED_TRANSFORM = "'x y z roll pitch yaw' or 'x y z qx qy qz qw' [m, rad]"
 
 
@@ -144,11 +146,11 @@ class FrameTree:
                         rows.setdefault(child, []).append((time, pose))
             self._poses = {child: _table(listed, start) for child, listed in rows.items()}
         for child, (_, poses) in self._poses.items():
-            norms = np.linalg.norm(poses[:, 3:], axis=1)
-            if not (np.isfinite(poses).all() and (norms > 1e-6).all()):
+            known = bool((np.abs(poses) <= _LARGEST).all())
+            if not known or not (np.linalg.norm(poses[:, 3:], axis=1) > 1e-6).all():
                 raise FileError(
                     f"{bag.path}: the transform of frame {child[:40]!r} in /tf has a zero "
-                    "quaternion or a number that is not finite"
+                    "quaternion or a number that is not finite, or far too large"
                 )
 
     @property

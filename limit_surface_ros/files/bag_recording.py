@@ -26,7 +26,7 @@ from limit_surface_ros.files.bag_messages import (
     read_samples,
 )
 from limit_surface_ros.files.bag_reader import open_bag
-from limit_surface_ros.files.recordings.pushes import Recording
+from limit_surface_ros.files.recordings.pushes import LARGEST_SAMPLE, Recording
 from limit_surface_ros.files.recordings.selection import Selection
 
 if TYPE_CHECKING:
@@ -253,7 +253,7 @@ class _Reading:
 
     def _clean(self, samples: Samples) -> Floats:
         """Sort samples, leave out those that are not finite or repeat a time; return times [s]."""
-        finite = np.isfinite(samples.values).all(axis=1)
+        finite = (np.abs(samples.values) <= LARGEST_SAMPLE).all(axis=1)
         if not finite.all():
             left = int(np.count_nonzero(~finite))
             self.notes.append(f"{left} messages on {samples.topic} are not finite: left out")

@@ -67,6 +67,7 @@ def only_errors_of_the_package(read):
     """Run a reader; whatever it raises must be of the package, and say something."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
+        warnings.simplefilter("error", RuntimeWarning)
         try:
             return read()
         except LimitSurfaceError as error:

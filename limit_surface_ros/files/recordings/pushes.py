@@ -30,6 +30,8 @@ IN_PLANE = [0, 1, 5]
 # certain they are is looked at for every so many.
 _CLOCK_STEP, _CLOCK_MARGIN, _CLOCK_STRIDE = 0.01, 0.05, 10
 _LEAST_REST, _FEWEST = 0.1, 8
+# Numbers beyond this are of no recording, and their squares and products overflow.
+LARGEST_SAMPLE = 1e12
 # Takes wrenches, shape (n, 6), in the sensor's frame at times, shape (n,), to the body's frame.
 ToBody: TypeAlias = Callable[["Floats", "Floats"], "Floats"]
 
@@ -147,7 +149,8 @@ def find_pushes(
         if count < 2:
             raise DataError(f"the recording holds {count} {what} samples, at least 2 are needed")
     recorded = len(recording.wrench_times)
-    finite = np.isfinite(recording.wrenches).all(axis=1)
+    # NaN fails this, too.
+    finite = (np.abs(recording.wrenches) <= LARGEST_SAMPLE).all(axis=1)
     if np.count_nonzero(finite) < _FEWEST:
         raise DataError("the wrenches hold hardly a finite number")
     recording = replace(
