@@ -23,6 +23,7 @@ from limit_surface_ros.nodes import convert
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.scaling import Scaling
 from node_helpers import Program, wrench_message
+from process_helpers import WAIT
 
 BATCHES = 20
 
@@ -42,7 +43,7 @@ def test_twenty_batches_that_wait_at_a_signal_all_get_an_answer(
             "/limit_surface/wrenches_to_twists",
             qos_profile=QoSProfile(depth=2 * BATCHES),
         )
-        assert client.wait_for_service(timeout_sec=20.0)
+        assert client.wait_for_service(timeout_sec=WAIT)
         one = ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
         # A server drops answers to a client that it has yet to discover.
         while not ros.done(client.call_async(WrenchesToTwists.Request()), 2.0):
@@ -55,7 +56,7 @@ def test_twenty_batches_that_wait_at_a_signal_all_get_an_answer(
         code, output = program.end(signal.SIGINT)
     assert code == 0, output
     for future in waiting:
-        assert ros.done(future, 20.0)
+        assert ros.done(future, WAIT)
     codes = [future.result().error_code for future in waiting]
     assert set(codes) <= {ErrorCode.NONE, ErrorCode.UNAVAILABLE}
     assert ErrorCode.UNAVAILABLE in codes
@@ -105,7 +106,7 @@ def test_a_node_without_standard_streams_serves(ros, client_node, model_file):
         assert call(asked).error_code == ErrorCode.NONE
         assert process.poll() is None
         process.send_signal(signal.SIGTERM)
-        assert process.wait(timeout=20.0) == 0
+        assert process.wait(timeout=WAIT) == 0
     finally:
         if process.poll() is None:
             process.kill()

@@ -19,6 +19,7 @@ from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.scaling import Scaling
 from node_helpers import stamp_message, wrench_message
+from process_helpers import WAIT
 
 ROWS = 60_000
 STREAM = 100
@@ -33,7 +34,7 @@ def slow(ros, client_node, tmp_path):
     write_surface_model(SurfaceModel(name="slow", surface=surface), path)
     node = ros.add(LimitSurfaceNode, files=[path])
     client = client_node.create_client(WrenchesToTwists, "/limit_surface/wrenches_to_twists")
-    assert client.wait_for_service(timeout_sec=20.0)
+    assert client.wait_for_service(timeout_sec=WAIT)
 
     def ask(rows, spoil=None):
         wrenches = np.random.default_rng(rows).normal(size=(rows, 3))
@@ -61,7 +62,7 @@ def test_a_stream_and_other_calls_are_answered_before_a_long_batch_is(ros, clien
     assert node.endpoints.under_way == 1, "the batch was over before the others were answered"
     assert not batch.done()
     assert [twist.header.stamp.nanosec for twist in twists] == list(range(STREAM))
-    assert ros.done(batch, 60.0)
+    assert ros.done(batch, WAIT)
     assert batch.result().error_code == ErrorCode.NONE
     assert len(batch.result().twists) == 3 * ROWS
 
@@ -74,11 +75,11 @@ def test_short_batches_do_not_wait_for_a_long_one_and_long_ones_come_in_their_or
         future.add_done_callback(lambda _, name=name: over.append(name))
     ros.wait(lambda: node.endpoints.under_way == 3)
     short = ask(10)
-    assert ros.done(short, 60.0)
+    assert ros.done(short, WAIT)
     assert short.result().error_code == ErrorCode.NONE
     assert not first.done()
     for future in (first, second, broken):
-        assert ros.done(future, 60.0)
+        assert ros.done(future, WAIT)
     assert over == ["first", "second", "broken"]
     assert second.result().error_code == ErrorCode.NONE
     assert broken.result().error_code == ErrorCode.NOT_FINITE
@@ -92,9 +93,9 @@ def test_more_than_may_wait_is_refused_and_not_lost(ros, slow, monkeypatch):
     first = ask(ROWS)
     ros.wait(lambda: node.endpoints.under_way == 1)
     waits, refused = ask(3000), ask(3001)
-    assert ros.done(refused, 60.0)
+    assert ros.done(refused, WAIT)
     assert refused.result().error_code == ErrorCode.UNAVAILABLE
     assert "wait already" in refused.result().error_msg
-    assert ros.done(first, 60.0)
-    assert ros.done(waits, 60.0)
+    assert ros.done(first, WAIT)
+    assert ros.done(waits, WAIT)
     assert waits.result().error_code == ErrorCode.NONE

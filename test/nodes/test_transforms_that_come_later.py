@@ -24,6 +24,7 @@ from transform_helpers import Buffer
 from decay_helpers import stamp_of, time_of
 from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
 from node_helpers import planar_twist, wrench_message
+from process_helpers import WAIT
 
 SECOND = 1_000_000_000
 LOAD = np.array([9.0, 3.0, 0.1])
@@ -48,7 +49,7 @@ class Moving:
         ros.matched(self._loads)
         ros.matched(self.node._twists)
         self._client = client.create_client(WrenchToTwist, "/limit_surface/wrench_to_twist")
-        assert self._client.wait_for_service(timeout_sec=20.0)
+        assert self._client.wait_for_service(timeout_sec=WAIT)
 
     def publish(self, stamp, frame="tool"):
         """Send a load; wait until the node has it."""
@@ -70,7 +71,7 @@ class Moving:
             done.set()
 
         self.ros.executor.create_task(take)
-        assert done.wait(20.0)
+        assert done.wait(WAIT)
 
     @property
     def seen(self):
@@ -115,13 +116,13 @@ def test_a_service_waits_and_topics_and_other_calls_are_served_meanwhile(moving)
     waiting = bench.ask(12 * SECOND)
     bench.ros.wait(lambda: bench.buffer.waited_for == 1)
     other = bench.ask(10 * SECOND)
-    assert bench.ros.done(other, 20.0)
+    assert bench.ros.done(other, WAIT)
     np.testing.assert_allclose(planar_twist(other.result().twist), bench.expected(0.1), rtol=1e-9)
     bench.publish(10 * SECOND)
     bench.ros.wait(lambda: len(bench.answers) == 1)
     assert not waiting.done()
     bench.come(12 * SECOND, 0.5)
-    assert bench.ros.done(waiting, 20.0)
+    assert bench.ros.done(waiting, WAIT)
     assert waiting.result().error_code == ErrorCode.NONE
     np.testing.assert_allclose(
         planar_twist(waiting.result().twist), bench.expected(0.5), rtol=1e-9
@@ -132,12 +133,12 @@ def test_a_batch_waits_too(ros, client_node, moving):
     bench = moving(**PATIENT)
     bench.come(10 * SECOND, 0.1)
     many = client_node.create_client(WrenchesToTwists, "/limit_surface/wrenches_to_twists")
-    assert many.wait_for_service(timeout_sec=20.0)
+    assert many.wait_for_service(timeout_sec=WAIT)
     header = Header(frame_id="tool", stamp=stamp_of(11 * SECOND))
     answer = many.call_async(WrenchesToTwists.Request(header=header, wrenches=LOAD.tolist()))
     ros.wait(lambda: bench.buffer.waited_for == 1)
     bench.come(11 * SECOND, 0.2)
-    assert ros.done(answer, 20.0)
+    assert ros.done(answer, WAIT)
     np.testing.assert_allclose(answer.result().twists, bench.expected(0.2), rtol=1e-9)
 
 
@@ -149,7 +150,7 @@ def test_what_was_waited_for_in_vain_is_refused_with_its_code_and_counted(moving
     bench = moving(transform_timeout=0.05)
     bench.come(10 * SECOND, 0.1)
     answer = bench.ask(12 * SECOND, frame=frame)
-    assert bench.ros.done(answer, 20.0)
+    assert bench.ros.done(answer, WAIT)
     assert answer.result().error_code == code
     assert repr(frame) in answer.result().error_msg
     bench.publish(12 * SECOND, frame=frame)
@@ -163,7 +164,7 @@ def test_without_a_timeout_nothing_is_waited_for(moving):
     bench = moving(transform_timeout=0.0)
     bench.come(10 * SECOND, 0.1)
     answer = bench.ask(12 * SECOND)
-    assert bench.ros.done(answer, 20.0)
+    assert bench.ros.done(answer, WAIT)
     assert answer.result().error_code == ErrorCode.TRANSFORM_TOO_NEW
 
 
@@ -171,7 +172,7 @@ def test_what_is_older_than_all_that_is_remembered_is_refused_at_once(moving):
     bench = moving(**PATIENT)
     bench.come(10 * SECOND, 0.1)
     answer = bench.ask(9 * SECOND)
-    assert bench.ros.done(answer, 20.0)
+    assert bench.ros.done(answer, WAIT)
     assert answer.result().error_code == ErrorCode.TRANSFORM_TOO_OLD
 
 
