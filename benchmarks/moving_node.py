@@ -39,7 +39,7 @@ class MovingNode(LimitSurfaceNode):
 
     def _move(self) -> None:
         now = self.get_clock().now()
-        if hasattr(self._buffer, "waited_for"):
+        if not hasattr(self._buffer, "set_transform_static"):
             self._buffer.set_transform(now.nanoseconds, 0.01)
             return
         from geometry_msgs.msg import TransformStamped

@@ -9,7 +9,6 @@ from __future__ import annotations
 import bisect
 
 from geometry_msgs.msg import TransformStamped
-from rclpy.task import Future
 from rclpy.time import Time
 
 
@@ -25,15 +24,11 @@ class Buffer:
         self._child = child
         self._stamps: list[int] = []
         self._places: list[float] = []
-        self._coming: list[tuple[int, Future]] = []
 
     def set_transform(self, stamp: int, x: float) -> None:
         """Take a pose [m] at a stamp [ns], later than all before."""
         self._stamps.append(stamp)
         self._places.append(x)
-        for wanted, future in list(self._coming):
-            if wanted <= stamp:
-                future.set_result(True)
 
     def can_transform(self, target, source, time, timeout=None, return_debug_tuple=False):
         """Tell whether a transform is known, and if not why."""
@@ -63,21 +58,3 @@ class Buffer:
         pose.transform.translation.x = x if source == self._child else -x
         pose.transform.rotation.w = 1.0
         return pose
-
-    def wait_for_transform_async(self, target, source, time):
-        """Return a future that is done when the transform has come."""
-        future = Future()
-        if self.can_transform(target, source, time):
-            future.set_result(True)
-            return future
-        # What is never joined comes later than all stamps.
-        joined = {target, source} == self._frames
-        entry = time.nanoseconds if joined else 2**63, future
-        self._coming.append(entry)
-        future.add_done_callback(lambda _: self._coming.remove(entry))
-        return future
-
-    @property
-    def waited_for(self) -> int:
-        """How many wait for a transform."""
-        return len(self._coming)

@@ -9,6 +9,7 @@ not there yet, as that of a sensor on a moving arm when its message comes, is wa
 from __future__ import annotations
 
 import importlib.util
+import math
 import time
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -74,16 +75,19 @@ SETTINGS = (
 )
 # Inputs that wait; what more come are refused at once.
 MOST_WAITING = 2000
-# How often it is looked whether somebody has waited in vain [s].
-_SWEEP = 0.01
+# While somebody waits, how often it is looked whether transforms have come [s]. tf2's own futures
+# are forgotten only when new transforms come: where none do, they would pile up without end.
+_SWEEP = 0.005
 # A paused clock holds nobody longer than this many times transform_timeout, in real time.
 _PATIENCE = 10.0
 
 
 class _Wait(NamedTuple):
-    """An input that waits for its transform."""
+    """An input that waits for its transform: between which frames and at which stamp [ns]."""
 
     waiting: Waiting
+    frames: tuple[str, str]
+    stamp: int
     since: int
     real_since: float
 
@@ -112,11 +116,16 @@ class Frames:
         self._waits: list[_Wait] = []
         self._sweep = node.create_timer(
             _SWEEP,
-            self._end_waits_in_vain,
+            self._end_waits,
             clock=Clock(clock_type=ClockType.STEADY_TIME),
             autostart=False,
         )
         parameters.on_change(["static_transforms"], self._prepare)
+
+    @property
+    def waiting(self) -> int:
+        """How many inputs wait for their transforms."""
+        return len(self._waits)
 
     async def to_frame(self, target: str, header: Header) -> RigidTransform | None:
         """Return the transform from a message's frame to `target`; None: they are the same.
@@ -189,28 +198,41 @@ class Frames:
         if len(self._waits) >= MOST_WAITING:
             raise UnavailableError(f"more than {MOST_WAITING} inputs wait for transforms")
         waiting = Waiting()
-        coming = self._buffer.wait_for_transform_async(target, source, Time(nanoseconds=stamp))
-        wait = _Wait(waiting, self._now(), time.monotonic())
+        wait = _Wait(waiting, (target, source), stamp, self._now(), time.monotonic())
+        if not self._waits:
+            self._sweep.reset()
         self._waits.append(wait)
-        self._sweep.reset()
-        coming.add_done_callback(lambda _: waiting.settle())
         try:
             await waiting
         finally:
             self._waits.remove(wait)
-            coming.cancel()
 
-    def _end_waits_in_vain(self) -> None:
+    def _end_waits(self) -> None:
+        """Settle the waits whose transform has come, and those that were in vain."""
         if not self._waits:
             self._sweep.cancel()
             return
         timeout = self._parameters["transform_timeout"]
         now, real = self._now(), time.monotonic()
+        newest = {frames: self._newest(*frames) for frames in {w.frames for w in self._waits}}
         for wait in list(self._waits):
             waited = (now - wait.since) * 1e-9
-            # A clock that was set back has not waited less than no time.
-            if not 0.0 <= waited < timeout or real - wait.real_since > _PATIENCE * timeout:
+            if (
+                wait.stamp <= newest[wait.frames]
+                # A clock that was set back has not waited less than no time.
+                or not 0.0 <= waited < timeout
+                or real - wait.real_since > _PATIENCE * timeout
+            ):
                 wait.waiting.settle()
+
+    def _newest(self, target: str, source: str) -> float:
+        """Return the newest stamp at which a transform is known [ns]; -infinity: none is."""
+        try:
+            latest = self._buffer.get_latest_common_time(target, source).nanoseconds
+        except Exception:
+            return -math.inf
+        # Static transforms alone hold at any time, and tell 0.
+        return float(latest) or math.inf
 
     def _now(self) -> int:
         return int(self._node.get_clock().now().nanoseconds)

@@ -171,6 +171,7 @@ class PlanarInput:
 
     Attributes:
         policy: What the parameters say.
+        frames: Transforms to the models' frames.
 
     Args:
         parameters: The node's parameters, which include `SETTINGS`.
@@ -184,7 +185,7 @@ class PlanarInput:
         self, parameters: Parameters, frames: Frames, report: Callable[[str, str], None]
     ) -> None:
         """Follow the parameters."""
-        self._frames = frames
+        self.frames = frames
         self._report = report
         parameters.on_change([setting.name for setting in SETTINGS], self._prepare)
 
@@ -200,7 +201,7 @@ class PlanarInput:
         six = convert.wrench_components(stamped.wrench)
         frame = policy.frame_of(model)
         if stamped.header.frame_id != frame:
-            transform = await self._frames.to_frame(frame, stamped.header)
+            transform = await self.frames.to_frame(frame, stamped.header)
             if transform is not None:
                 six = transform.wrench(six).tolist()
         fx, fy, fz, tx, ty, tz = six
@@ -228,7 +229,7 @@ class PlanarInput:
         six = convert.twist_components(stamped.twist)
         frame = policy.frame_of(model)
         if stamped.header.frame_id != frame:
-            transform = await self._frames.to_frame(frame, stamped.header)
+            transform = await self.frames.to_frame(frame, stamped.header)
             if transform is not None:
                 six = transform.twist(six).tolist()
         vx, vy, vz, wx, wy, wz = six
@@ -257,7 +258,7 @@ class PlanarInput:
         frame = self.policy.frame_of(model)
         moved = np.eye(6)[[0, 1, 5]]
         if header.frame_id and header.frame_id != frame:
-            transform = await self._frames.to_frame(frame, header)
+            transform = await self.frames.to_frame(frame, header)
             moved = transform.wrench(moved) if what == "wrench" else transform.twist(moved)
             rho = model.surface.scaling.characteristic_length
             length = 1.0 / rho if what == "wrench" else rho
@@ -305,7 +306,7 @@ class PlanarInput:
         frame = self.policy.frame_of(model)
         if not header.frame_id or header.frame_id == frame:
             return moved
-        transform = await self._frames.to_frame(frame, header)
+        transform = await self.frames.to_frame(frame, header)
         return moved if transform is None else moved @ transform
 
     def _report_share(self, what: str, share: float) -> None:

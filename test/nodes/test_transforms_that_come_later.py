@@ -78,7 +78,7 @@ class Moving:
         """Loads that wait, were answered or refused."""
         health = self.node.health
         refused = sum(count for (name, _), count in health.refused.items() if name == "wrench")
-        return self.buffer.waited_for + health.accepted["wrench"] + refused
+        return self.node.input.frames.waiting + health.accepted["wrench"] + refused
 
     def expected(self, x):
         """The twist of the load with the tool at a place."""
@@ -97,7 +97,7 @@ def test_loads_wait_for_the_transform_at_their_stamp_and_are_answered_in_order(m
     stamps = [10 * SECOND + step * SECOND // 10 for step in range(1, 10)]
     for stamp in stamps:
         bench.publish(stamp)
-    assert bench.buffer.waited_for == len(stamps)
+    assert bench.node.input.frames.waiting == len(stamps)
     assert not bench.answers
     bench.come(11 * SECOND, 0.3)
     bench.ros.wait(lambda: len(bench.answers) == len(stamps))
@@ -107,14 +107,14 @@ def test_loads_wait_for_the_transform_at_their_stamp_and_are_answered_in_order(m
             planar_twist(answer), bench.expected(0.1 + 0.02 * step), rtol=1e-9, atol=1e-12
         )
     assert not bench.node.health.refused
-    assert not bench.buffer.waited_for
+    assert not bench.node.input.frames.waiting
 
 
 def test_a_service_waits_and_topics_and_other_calls_are_served_meanwhile(moving):
     bench = moving(**PATIENT)
     bench.come(10 * SECOND, 0.1)
     waiting = bench.ask(12 * SECOND)
-    bench.ros.wait(lambda: bench.buffer.waited_for == 1)
+    bench.ros.wait(lambda: bench.node.input.frames.waiting == 1)
     other = bench.ask(10 * SECOND)
     assert bench.ros.done(other, WAIT)
     np.testing.assert_allclose(planar_twist(other.result().twist), bench.expected(0.1), rtol=1e-9)
@@ -136,7 +136,7 @@ def test_a_batch_waits_too(ros, client_node, moving):
     assert many.wait_for_service(timeout_sec=WAIT)
     header = Header(frame_id="tool", stamp=stamp_of(11 * SECOND))
     answer = many.call_async(WrenchesToTwists.Request(header=header, wrenches=LOAD.tolist()))
-    ros.wait(lambda: bench.buffer.waited_for == 1)
+    ros.wait(lambda: bench.node.input.frames.waiting == 1)
     bench.come(11 * SECOND, 0.2)
     assert ros.done(answer, WAIT)
     np.testing.assert_allclose(answer.result().twists, bench.expected(0.2), rtol=1e-9)
@@ -156,7 +156,7 @@ def test_what_was_waited_for_in_vain_is_refused_with_its_code_and_counted(moving
     bench.publish(12 * SECOND, frame=frame)
     name = {ErrorCode.TRANSFORM_TOO_NEW: "TRANSFORM_TOO_NEW"}.get(code, "UNKNOWN_FRAME")
     bench.ros.wait(lambda: bench.node.health.refused["wrench", name] == 1)
-    assert not bench.buffer.waited_for
+    assert not bench.node.input.frames.waiting
     assert not bench.answers
 
 
