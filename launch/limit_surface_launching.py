@@ -27,6 +27,7 @@ TOPICS = {
         "wrench_topic": "~/wrench",
         "twist_topic": "~/twist",
         "predicted_twist_topic": "~/predicted_twist",
+        "predicted_twist_with_covariance_topic": "~/predicted_twist_with_covariance",
         "required_wrench_topic": "~/required_wrench",
         "surface_topic": "~/surface",
         "push_topic": "~/push",
