@@ -10,11 +10,15 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from limit_surface_ros.errors import DataError
+from limit_surface_ros.surface.gauges.jacobians import support_hessians, unit_jacobians
 from limit_surface_ros.surface.linalg import of_unit_length
 
 if TYPE_CHECKING:
-    from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.gauges.gauge import FirstOrder, Gauge, ScalarGauge, Vector
+    from limit_surface_ros.checks import Bools, Floats
+    from limit_surface_ros.surface.gauges.gauge import Gauge, ScalarGauge, Vector
     from limit_surface_ros.surface.support.solvers import SupportSolver
 
 
@@ -61,6 +65,32 @@ class Shape(ABC):
     def load_scalar(self, _motion: Vector) -> Vector | None:
         """Return the load on the surface with the most power for one motion, not zero."""
         return None
+
+    def motion_jacobians(self, loads: Floats) -> tuple[Floats, Floats, Floats, Bools]:
+        """Return factors, unit motions, the motions' derivatives by the load, and where smooth.
+
+        Args:
+            loads: None is zero, and each is of size about one, shape (3, m).
+
+        Returns:
+            Load factors (m,), motions (3, m), Jacobians (3, 3, m), and whether the map has a
+            derivative at each load (m,); where it has none the Jacobian is that of what is smooth.
+
+        Raises:
+            DataError: The kind has no derivatives in closed form.
+        """
+        raise DataError("this kind of surface has no derivatives in closed form")
+
+    def load_jacobians(self, motions: Floats) -> tuple[Floats, Floats, Bools]:
+        """Return the loads of maximum dissipation, their derivatives, and where smooth.
+
+        Args:
+            motions: None is zero, and each is of size about one, shape (3, m).
+
+        Raises:
+            DataError: The kind has no derivatives in closed form.
+        """
+        raise DataError("this kind of surface has no derivatives in closed form")
 
     def expect(self, _count: float) -> None:  # noqa: B027, most shapes have nothing to make
         """Make now what pays if so many vectors come at once; see `support.tabulated`."""
@@ -116,6 +146,21 @@ class GaugeShape(Shape):
         """Return the loads of maximum dissipation; see `Shape`."""
         return self.solver.solve(motions)[0]
 
+    def motion_jacobians(self, loads: Floats) -> tuple[Floats, Floats, Floats, Bools]:
+        """Return factors, motions and their derivatives; see `Shape`."""
+        factors, gradients, hessians = self._derivatives(loads)
+        smooth = np.asarray(np.isfinite(hessians).all(axis=(0, 1)))
+        return (factors, *unit_jacobians(gradients, hessians), smooth)
+
+    def load_jacobians(self, motions: Floats) -> tuple[Floats, Floats, Bools]:
+        """Return loads and their derivatives; see `Shape`."""
+        loads = self.loads(motions)
+        _, gradients, hessians = self._derivatives(loads)
+        return (loads, *support_hessians(motions, loads, gradients, hessians))
+
+    def _derivatives(self, loads: Floats) -> tuple[Floats, Floats, Floats]:
+        return self._gauge.derivatives(loads, np.zeros(loads.shape[1]))
+
     def load_factor_scalar(self, load: Vector) -> float | None:
         """Return the load factor of one load; see `Shape`."""
         return self._scalar.value(load)
@@ -144,7 +189,7 @@ class DissipationShape(Shape):
         scalar: The same for one motion, if plain floats are quicker.
     """
 
-    def __init__(self, dissipation: FirstOrder, scalar: ScalarGauge | None) -> None:
+    def __init__(self, dissipation: Gauge, scalar: ScalarGauge | None) -> None:
         """Keep the two."""
         self.dissipation = dissipation
         self._scalar = scalar
@@ -189,6 +234,21 @@ class DissipationShape(Shape):
             return None
         power = motion[0] * load[0] + motion[1] * load[1] + motion[2] * load[2]
         return power, motion
+
+    def motion_jacobians(self, loads: Floats) -> tuple[Floats, Floats, Floats, Bools]:
+        """Return factors, motions and their derivatives; see `Shape`."""
+        motions, factors = self.solver.solve(loads)
+        _, gradients, hessians = self._derivatives(motions)
+        second, smooth = support_hessians(loads, motions, gradients, hessians)
+        return (factors, *unit_jacobians(motions, second), smooth)
+
+    def load_jacobians(self, motions: Floats) -> tuple[Floats, Floats, Bools]:
+        """Return loads and their derivatives; see `Shape`."""
+        _, gradients, hessians = self._derivatives(motions)
+        return gradients, hessians, np.asarray(np.isfinite(hessians).all(axis=(0, 1)))
+
+    def _derivatives(self, motions: Floats) -> tuple[Floats, Floats, Floats]:
+        return self.dissipation.derivatives(motions, np.zeros(motions.shape[1]))
 
     def expect(self, count: float) -> None:
         """Make what pays if so many vectors come at once; see `Shape`."""

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The promise of Jacobians: what differences tend to, and the identities of conjugate gauges."""
+
+import numpy as np
+import pytest
+
+from export_models import MODELS, SCALING, TRIANGLE, vectors
+from limit_surface_ros.surface import PointContacts, PowerSum, Scaling
+
+W, V = SCALING.wrench_unit, SCALING.twist_unit
+RHO = SCALING.characteristic_length
+SMOOTH = ["ellipsoid", "thesis_2", "thesis_3_convex", "norms_4", "dissipation_4", "polynomial"]
+
+
+def scaled(jacobians, out, into):
+    """Return Jacobians in scaled variables."""
+    return jacobians / np.multiply.outer(out, 1.0 / into)
+
+
+def differences(one, vectors_of, unit, step=1e-5):
+    """Return derivatives (m, 3, 3) by central differences of fourth order."""
+    found = np.empty((len(vectors_of), 3, 3))
+    for axis in range(3):
+        move = np.zeros(3)
+        move[axis] = step * unit[axis]
+        size = np.linalg.norm(vectors_of / unit, axis=1, keepdims=True)
+        h = size * move
+        near = one(vectors_of + h) - one(vectors_of - h)
+        far = one(vectors_of + 2.0 * h) - one(vectors_of - 2.0 * h)
+        found[:, :, axis] = (8.0 * near - far) / (12.0 * h.sum(axis=1, keepdims=True))
+    return found
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_jacobians_are_what_differences_tend_to(name):
+    surface = MODELS[name]
+    asked = vectors(name, 300)[:-2]
+    wrenches, twists = asked * [1.0, 1.0, RHO], asked / [1.0, 1.0, RHO]
+
+    def twist_of(rows):
+        return np.array([surface.twist_of_wrench(row) for row in rows])
+
+    def wrench_of(rows):
+        return np.array([surface.wrench_of_twist(row) for row in rows])
+
+    for given, method, one, out, into in (
+        (wrenches, surface.twist_jacobian, twist_of, V, W),
+        (twists, surface.wrench_jacobian, wrench_of, W, V),
+    ):
+        values, jacobians = method(given)
+        assert np.allclose(values, one(given), rtol=1e-9, atol=1e-12)
+        right = scaled(differences(one, given, into), out, into)
+        error = np.abs(scaled(jacobians, out, into) - right).max(axis=(1, 2))
+        error /= np.abs(right).max(axis=(1, 2))
+        assert np.median(error) < 1e-8
+        assert error.max() < 1e-5
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_conjugate_gauges_have_inverse_curvatures(name):
+    surface = MODELS[name]
+    wrenches = vectors(name, 2000)[:-2] * [1.0, 1.0, RHO]
+    kappa, k = surface.quadratic_twist(wrenches)
+    # K w = kappa, and kappa is g times its gradient.
+    again = np.einsum("mij,mj->mi", k, wrenches)
+    assert np.abs((again - kappa) / V).max() < 1e-9 * np.abs(kappa / V).max()
+    gradient = surface.load_factor_gradient(wrenches)
+    factors = surface.load_factor(wrenches)
+    assert np.allclose(kappa, gradient * factors[:, np.newaxis], rtol=1e-9, atol=1e-14)
+    assert np.allclose((gradient * wrenches).sum(axis=1), factors, rtol=1e-12)
+    # M = grad D grad D' + D Hess D at kappa is the inverse of K.
+    load, second = surface.wrench_jacobian(kappa)
+    dissipation = (load * kappa).sum(axis=1)
+    m = load[:, :, np.newaxis] * load[:, np.newaxis]
+    m += dissipation[:, np.newaxis, np.newaxis] * second
+    one = scaled(k @ m, V, V) - np.eye(3)
+    assert np.median(np.abs(one).max(axis=(1, 2))) < 1e-11
+    assert np.quantile(np.abs(one).max(axis=(1, 2)), 0.99) < 1e-6
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_no_jacobian_is_nan_and_each_takes_its_vector_to_zero(name):
+    surface = MODELS[name]
+    asked = vectors(name, 400)
+    wrenches, twists = asked * [1.0, 1.0, RHO], asked / [1.0, 1.0, RHO]
+    _, by_wrench = surface.twist_jacobian(wrenches)
+    _, by_twist = surface.wrench_jacobian(twists)
+    assert np.isfinite(by_wrench).all()
+    assert np.isfinite(by_twist).all()
+    assert surface.is_smooth_at(wrenches).shape == (400,)
+    for jacobians, given, out, into in ((by_wrench, wrenches, V, W), (by_twist, twists, W, V)):
+        plain = scaled(jacobians, out, into)[:-2]
+        kept = np.abs(np.einsum("mij,mj->mi", plain, (given / into)[:-2])).max(axis=1)
+        size = np.abs(plain).max(axis=(1, 2)) * np.linalg.norm((given / into)[:-2], axis=1)
+        assert np.quantile(kept / (size + 1e-30), 0.95) < 1e-8
+    symmetric = scaled(by_twist, W, V)[:-2]
+    size = np.abs(symmetric).max(axis=(1, 2), keepdims=True) + 1e-30
+    assert np.quantile(np.abs(symmetric - np.swapaxes(symmetric, 1, 2)) / size, 0.99) < 1e-9
+
+
+def test_a_sphere_and_an_ellipsoid_have_their_closed_forms():
+    sphere = PowerSum(np.eye(3)[np.newaxis], [1.0])
+    wrench = np.array([2.0, -1.0, 2.0])
+    unit = wrench / 3.0
+    right = (np.eye(3) - np.outer(unit, unit)) / 3.0
+    assert np.abs(sphere.twist_jacobian(wrench)[1] - right).max() < 1e-15
+    matrix = np.array([[2.0, 0.3, 0.1], [0.3, 1.0, -0.2], [0.1, -0.2, 1.5]])
+    surface = PowerSum(matrix[np.newaxis], [1.0], Scaling(0.05, 2.0))
+    L = matrix / np.multiply.outer(surface.scaling.wrench_unit, surface.scaling.wrench_unit)
+    kappa, k = surface.quadratic_twist(wrench)
+    assert np.allclose(kappa, L @ wrench, rtol=1e-12)
+    assert np.allclose(k, L, rtol=1e-10)
+
+
+def test_two_points_have_the_load_and_the_slope_that_one_writes_down():
+    # Limits m at (+-a, 0): a motion along y loads both by m, and x and turning resist with 2 m.
+    a, m = 0.1, 3.0
+    surface = PointContacts([[a, 0.0], [-a, 0.0]], [m, m], Scaling(0.1, 6.0))
+    wrench, jacobian = surface.wrench_jacobian([1.0, 0.0, 0.0])
+    assert np.allclose(wrench, [2.0 * m, 0.0, 0.0])
+    assert np.allclose(jacobian, np.diag([0.0, 2.0 * m, 2.0 * m * a * a]), atol=1e-12)
+
+
+def test_within_a_facet_the_motion_does_not_change():
+    x, y = TRIANGLE.points[0]
+    rest = TRIANGLE.wrench_of_twist([y, -x, 1.0])
+    forces = 0.3 * np.array([[1.0, 0.0], [0.0, 1.0], [-0.6, 0.5]])
+    loads = rest + np.column_stack([forces, x * forces[:, 1] - y * forces[:, 0]])
+    twists, jacobians = TRIANGLE.twist_jacobian(loads)
+    assert not jacobians.any()
+    assert np.allclose(twists[0], twists[1])
+    assert (TRIANGLE.load_factor_gradient(loads) * loads).sum(axis=1) == pytest.approx(1.0)
