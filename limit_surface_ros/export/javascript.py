@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def javascript_engine() -> str:
     """Return the text of `makeSurface(numbers)`, for pages that hold several models."""
-    return template("engine.js").rstrip("\n")
+    return template("engine.js").partition("\n")[2].strip("\n")
 
 
 def javascript_numbers(model: Portable, name: str) -> str:

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The maps of a limit surface from its numbers; see makeSurface.
 
 const KINK = 1e-14, NULL = 1e-28;
