@@ -29,8 +29,9 @@ if TYPE_CHECKING:
 
 # Newton's method needs three to seven steps for a scale.
 _STEPS = 60
-# A form below this would make its term's curvature lose its digits: a corner is near.
-_SMALL = 1e-9
+# A form below this, beside a corner, has lost digits as a sum of products in the plane, and so
+# would the point: solvers of columns, which take the form from its root, keep them.
+_SMALL = 1e-6
 
 
 class NormSumScalar:
