@@ -3,12 +3,11 @@
 
 import html
 import re
-import shutil
-import subprocess
 
 import numpy as np
 import pytest
 
+from browser_helpers import document_of, needs_browser
 from export_models import MODELS, SCALING, TRIANGLE
 from limit_surface_ros.export.explorer import explorer_page, outline_of
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
@@ -16,17 +15,6 @@ from limit_surface_ros.motion.push import push
 from limit_surface_ros.surface import PointContacts
 from limit_surface_ros.tools.explore_surface import main
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-FLAGS = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
 # Presses keys and moves sliders as somebody would, then writes down where everything stands.
 USE = """<pre id="seen"></pre><script type="module">
 const press = (id, key, times) => { for (let i = 0; i < times; ++i) document.getElementById(id)
@@ -53,7 +41,7 @@ def numbers(text):
     return [float(each) for each in re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?", text)]
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine; .ci/run installs it")
+@needs_browser
 @pytest.mark.parametrize(("direction", "friction"), [(0, 0.3), (70, 0.3), (-70, 0.3), (20, 1.5)])
 def test_a_page_that_is_used_shows_what_the_library_says(direction, friction, tmp_path):
     surfaces = {"triangle": TRIANGLE, "norms": MODELS["norms_4"]}
@@ -61,11 +49,7 @@ def test_a_page_that_is_used_shows_what_the_library_says(direction, friction, tm
     use = USE.replace("DIRECTION", str(direction)).replace("FRICTION", str(friction))
     page = tmp_path / "page.html"
     page.write_text(explorer_page(models).replace("</body>", use + "</body>"), encoding="utf-8")
-    profile = f"--user-data-dir={tmp_path / 'profile'}"
-    command = [CHROMIUM, *FLAGS, profile, "--window-size=360,800", "--virtual-time-budget=20000"]
-    dump = subprocess.run(
-        [*command, "--dump-dom", page.as_uri()], capture_output=True, text=True, check=True
-    ).stdout
+    dump = document_of(page, "--window-size=360,800")
     seen = html.unescape(re.search(r'<pre id="seen">(.*?)</pre>', dump, re.DOTALL)[1])
     *rows, load, place, fits = seen.split("\n")
     assert fits == "true"

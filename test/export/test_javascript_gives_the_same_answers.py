@@ -10,6 +10,7 @@ import subprocess
 import numpy as np
 import pytest
 
+from browser_helpers import document_of, needs_browser
 from export_models import MODELS, SCALING, scaled_error, vectors
 from limit_surface_ros.export.javascript import (
     javascript_engine,
@@ -18,18 +19,7 @@ from limit_surface_ros.export.javascript import (
 )
 from limit_surface_ros.export.portable import portable
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 NODE = shutil.which("node")
-FLAGS = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
 COUNT = 200
 PAGE = """<!doctype html><meta charset="utf-8"><pre></pre><script type="module">
 {engine}
@@ -47,7 +37,7 @@ document.querySelector("pre").textContent = JSON.stringify(answers);
 </script>"""
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine; .ci/run installs it")
+@needs_browser
 def test_a_browser_gives_the_answers_of_the_library(tmp_path):
     numbers = {
         name: json.loads(javascript_numbers(portable(s), name)) for name, s in MODELS.items()
@@ -64,13 +54,7 @@ def test_a_browser_gives_the_answers_of_the_library(tmp_path):
         ),
         encoding="utf-8",
     )
-    profile = f"--user-data-dir={tmp_path / 'profile'}"
-    dump = subprocess.run(
-        [CHROMIUM, *FLAGS, profile, "--virtual-time-budget=60000", "--dump-dom", page.as_uri()],
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout
+    dump = document_of(page)
     answers = json.loads(html.unescape(re.search(r"<pre>(.*?)</pre>", dump, re.DOTALL)[1]))
     for name, surface in MODELS.items():
         found = np.array(answers[name])

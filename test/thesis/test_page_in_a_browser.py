@@ -4,11 +4,10 @@
 import html
 import json
 import re
-import shutil
-import subprocess
 
 import pytest
 
+from browser_helpers import document_of, needs_browser
 from limit_surface_ros.thesis.exact_surfaces import STUDIES
 from limit_surface_ros.thesis.run import carry_out
 from limit_surface_ros.thesis.settings import QUICK
@@ -16,17 +15,6 @@ from limit_surface_ros.thesis.store import Store
 
 pytest.importorskip("matplotlib", reason="matplotlib draws the pictures")
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-FLAGS = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
 PHONE = 360
 # Shows the page in a frame as wide as a phone and writes down what came of it.
 FRAME = """<!doctype html><iframe width={width} height=800 srcdoc="{page}"></iframe><pre></pre>
@@ -43,18 +31,12 @@ FRAME = """<!doctype html><iframe width={width} height=800 srcdoc="{page}"></ifr
 }})</script>"""
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine; .ci/run installs it")
+@needs_browser
 def test_a_phone_shows_every_figure_within_its_width(tmp_path):
     page = carry_out(STUDIES, Store(tmp_path, QUICK)).read_text(encoding="utf-8")
     frame = tmp_path / "frame.html"
     frame.write_text(FRAME.format(width=PHONE, page=html.escape(page)), encoding="utf-8")
-    profile = f"--user-data-dir={tmp_path / 'profile'}"
-    dump = subprocess.run(
-        [CHROMIUM, *FLAGS, profile, "--virtual-time-budget=10000", "--dump-dom", frame.as_uri()],
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout
+    dump = document_of(frame)
     seen = json.loads(html.unescape(re.search(r"<pre>(.*?)</pre>", dump, re.DOTALL)[1]))
     assert seen["width"] <= seen["window"] <= PHONE
     assert [heading.split()[0] for heading in seen["headings"]] == [s.number for s in STUDIES]
