@@ -54,7 +54,7 @@ def installed_files(folder: str) -> list[tuple[str, list[str]]]:
 
 setup(
     name=PACKAGE,
-    version="0.1.0",
+    version="0.2.0",
     description="Limit surfaces of sliding bodies and decay models, fitted and served over ROS 2",
     license="Apache-2.0",
     maintainer="limit_surface_ros maintainers",

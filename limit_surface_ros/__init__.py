@@ -6,4 +6,4 @@ Layers, lowest first: `errors` and `checks`, then `surface`, `fitting`, `decay`,
 imports rclpy. See docs/architecture.md.
 """
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
