@@ -44,8 +44,8 @@ from node_processes import (
 from rclpy.qos import QoSProfile
 
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
-from limit_surface_ros.nodes import convert
-from limit_surface_ros.nodes.service_client import ServiceClient
+from limit_surface_ros.nodes.clients.service_client import ServiceClient
+from limit_surface_ros.nodes.messages import convert
 
 SINGLE_CALLS = 1500
 BATCH_CALLS = 100

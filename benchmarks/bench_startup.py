@@ -22,7 +22,7 @@ from node_processes import OURS, isolate, process, resident, wrench_message
 from std_srvs.srv import Trigger
 
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
-from limit_surface_ros.nodes.service_client import AGAIN
+from limit_surface_ros.nodes.clients.service_client import AGAIN
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
 
 if TYPE_CHECKING:

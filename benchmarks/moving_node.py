@@ -12,8 +12,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from limit_surface_ros.nodes import spin
 from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
+from limit_surface_ros.nodes.serving import spin
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test"))
 PERIOD = 1.0 / 30.0

@@ -128,8 +128,9 @@ def test_no_imports_go_in_a_circle():
         pytest.fail(f"a circle of imports: {' -> '.join(error.args[1])}")
 
 
-def test_no_folder_of_surfaces_is_a_maze():
-    for folder in (ROOT / "surface", *(ROOT / "surface").rglob("*/")):
+@pytest.mark.parametrize("room", ["surface", "nodes"])
+def test_no_folder_is_a_maze(room):
+    for folder in (ROOT / room, *(ROOT / room).rglob("*/")):
         modules = [path for path in folder.glob("*.py") if path.name != "__init__.py"]
         assert len(modules) <= 10, f"{folder.name} has {len(modules)} modules"
 

@@ -18,8 +18,8 @@ from limit_surface_interfaces.msg import ErrorCode
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from limit_surface_ros.errors import FileError, LimitSurfaceError, RangeError
-from limit_surface_ros.nodes.plain_messages import fill, plain, type_of
-from limit_surface_ros.nodes.service_client import ServiceClient
+from limit_surface_ros.nodes.clients.plain_messages import fill, plain, type_of
+from limit_surface_ros.nodes.clients.service_client import ServiceClient
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

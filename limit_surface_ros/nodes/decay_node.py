@@ -15,25 +15,20 @@ from limit_surface_ros.decay.estimation import EstimationOptions
 from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.decay_file import DecayModel, read_decay_model
 from limit_surface_ros.files.surface_file import read_surface_model
-from limit_surface_ros.nodes import (
-    convert,
-    frames,
-    model_info,
-    planar_input,
-    running_decay,
-    sliding_services,
-    spin,
-)
-from limit_surface_ros.nodes.batches import Batches
-from limit_surface_ros.nodes.convert import SECOND, nanoseconds
-from limit_surface_ros.nodes.endpoints import STREAM_DEPTH, Service
-from limit_surface_ros.nodes.model_host import model_settings
-from limit_surface_ros.nodes.model_info import ModelList
-from limit_surface_ros.nodes.model_node import COMMON_SETTINGS, ModelNode
-from limit_surface_ros.nodes.onset import Onset
-from limit_surface_ros.nodes.onset_stream import OnsetStream
-from limit_surface_ros.nodes.planar_input import PlanarInput, prepare_surface
-from limit_surface_ros.nodes.settings import Setting
+from limit_surface_ros.nodes.decay import running_decay, sliding_services
+from limit_surface_ros.nodes.decay.onset import Onset
+from limit_surface_ros.nodes.decay.onset_stream import OnsetStream
+from limit_surface_ros.nodes.messages import convert, frames, planar_input
+from limit_surface_ros.nodes.messages.convert import SECOND, nanoseconds
+from limit_surface_ros.nodes.messages.planar_input import PlanarInput, prepare_surface
+from limit_surface_ros.nodes.models import model_info
+from limit_surface_ros.nodes.models.model_host import model_settings
+from limit_surface_ros.nodes.models.model_info import ModelList
+from limit_surface_ros.nodes.models.model_node import COMMON_SETTINGS, ModelNode
+from limit_surface_ros.nodes.serving import spin
+from limit_surface_ros.nodes.serving.batches import Batches
+from limit_surface_ros.nodes.serving.endpoints import STREAM_DEPTH, Service
+from limit_surface_ros.nodes.serving.settings import Setting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

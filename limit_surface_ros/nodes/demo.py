@@ -24,8 +24,9 @@ from typing import TYPE_CHECKING, Any
 from geometry_msgs.msg import Twist, TwistStamped, Wrench, WrenchStamped
 from limit_surface_interfaces.srv import ListModels, TwistToWrench, WrenchToTwist
 
-from limit_surface_ros.nodes import convert, demo_decay, demo_push
-from limit_surface_ros.nodes.service_client import ServiceClient
+from limit_surface_ros.nodes.clients import demo_decay, demo_push
+from limit_surface_ros.nodes.clients.service_client import ServiceClient
+from limit_surface_ros.nodes.messages import convert
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import sys
 
-from limit_surface_ros.nodes import decay_node, limit_surface_node, spin
+from limit_surface_ros.nodes import decay_node, limit_surface_node
 from limit_surface_ros.nodes.decay_node import DecayNode
 from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
-from limit_surface_ros.nodes.model_node import COMMON_SETTINGS
+from limit_surface_ros.nodes.models.model_node import COMMON_SETTINGS
+from limit_surface_ros.nodes.serving import spin
 
 
 def main() -> int:

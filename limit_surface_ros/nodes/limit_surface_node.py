@@ -19,23 +19,12 @@ from limit_surface_interfaces.srv import (
 
 from limit_surface_ros.files.surface_file import SurfaceModel, read_surface_model
 from limit_surface_ros.motion.push import ContactMode, push
-from limit_surface_ros.nodes import (
-    convert,
-    frames,
-    learning,
-    model_info,
-    planar_input,
-    push_services,
-    spin,
-    surface_markers,
-)
-from limit_surface_ros.nodes.batches import Batches, empty_rows
-from limit_surface_ros.nodes.endpoints import STREAM_DEPTH, WAITING_LARGE, Service
-from limit_surface_ros.nodes.frames import Frames
-from limit_surface_ros.nodes.model_host import model_settings
-from limit_surface_ros.nodes.model_info import ModelList
-from limit_surface_ros.nodes.model_node import COMMON_SETTINGS, ModelNode
-from limit_surface_ros.nodes.planar_input import (
+from limit_surface_ros.nodes.limit_surface import learning, push_services, surface_markers
+from limit_surface_ros.nodes.limit_surface.push_markers import PushMarkers
+from limit_surface_ros.nodes.limit_surface.surface_markers import SurfaceMarkers
+from limit_surface_ros.nodes.messages import convert, frames, planar_input
+from limit_surface_ros.nodes.messages.frames import Frames
+from limit_surface_ros.nodes.messages.planar_input import (
     PlanarInput,
     covariance_at_origin,
     prepare_surface,
@@ -43,9 +32,14 @@ from limit_surface_ros.nodes.planar_input import (
     twist_at_origin,
     wrench_at_origin,
 )
-from limit_surface_ros.nodes.push_markers import PushMarkers
-from limit_surface_ros.nodes.settings import Setting
-from limit_surface_ros.nodes.surface_markers import SurfaceMarkers
+from limit_surface_ros.nodes.models import model_info
+from limit_surface_ros.nodes.models.model_host import model_settings
+from limit_surface_ros.nodes.models.model_info import ModelList
+from limit_surface_ros.nodes.models.model_node import COMMON_SETTINGS, ModelNode
+from limit_surface_ros.nodes.serving import spin
+from limit_surface_ros.nodes.serving.batches import Batches, empty_rows
+from limit_surface_ros.nodes.serving.endpoints import STREAM_DEPTH, WAITING_LARGE, Service
+from limit_surface_ros.nodes.serving.settings import Setting
 from limit_surface_ros.surface.frames import power
 from limit_surface_ros.surface.kinds.dissipation_scatter import region_quantile
 

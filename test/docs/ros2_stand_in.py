@@ -14,7 +14,7 @@ import sys
 import threading
 from pathlib import Path
 
-from limit_surface_ros.nodes.plain_messages import fill, type_of
+from limit_surface_ros.nodes.clients.plain_messages import fill, type_of
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "docs")]

@@ -14,8 +14,8 @@ pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not b
 from limit_surface_interfaces.msg import ErrorCode
 from limit_surface_interfaces.srv import TwistsToWrenches, WrenchesToTwists
 
-from limit_surface_ros.nodes import convert
 from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
+from limit_surface_ros.nodes.messages import convert
 
 
 @pytest.fixture

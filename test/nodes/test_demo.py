@@ -49,7 +49,7 @@ def test_the_demonstration_pushes_the_body_along_a_path(output):
 def test_nobody_is_waited_for_who_has_ended():
     from limit_surface_interfaces.srv import ListModels
 
-    from limit_surface_ros.nodes.service_client import ServiceClient
+    from limit_surface_ros.nodes.clients.service_client import ServiceClient
 
     with (
         ServiceClient("asks", patience=3600.0, alive=lambda: False) as client,

@@ -19,7 +19,7 @@ from limit_surface_interfaces.srv import WrenchesToTwists, WrenchToTwist
 from rclpy.qos import QoSProfile
 
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
-from limit_surface_ros.nodes import convert
+from limit_surface_ros.nodes.messages import convert
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.scaling import Scaling
 from node_helpers import Program, wrench_message

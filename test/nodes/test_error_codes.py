@@ -10,7 +10,7 @@ pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not b
 from limit_surface_interfaces.msg import ErrorCode
 
 from limit_surface_ros import errors
-from limit_surface_ros.nodes import answers
+from limit_surface_ros.nodes.serving import answers
 
 
 def all_errors(kind=errors.LimitSurfaceError):

@@ -32,9 +32,9 @@ from rclpy.serialization import serialize_message
 from std_msgs.msg import Header
 
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
-from limit_surface_ros.nodes import convert
-from limit_surface_ros.nodes.answers import FiniteCheck
 from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
+from limit_surface_ros.nodes.messages import convert
+from limit_surface_ros.nodes.serving.answers import FiniteCheck
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.scaling import Scaling
 from node_helpers import Program, planar_twist, wrench_message

@@ -24,8 +24,8 @@ from limit_surface_interfaces.srv import (
 from rclpy.parameter import Parameter
 from std_msgs.msg import Header
 
-from limit_surface_ros.nodes import convert
 from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
+from limit_surface_ros.nodes.messages import convert
 from node_helpers import STAMP, planar_twist, planar_wrench, twist_message, wrench_message
 
 TOOL = "object tool 0.1 0.02 0.3 0 0 0.5"

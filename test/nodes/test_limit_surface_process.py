@@ -16,7 +16,7 @@ from limit_surface_interfaces.srv import WrenchToTwist
 
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.nodes import decay_node, limit_surface_node
-from limit_surface_ros.nodes.model_node import COMMON_SETTINGS
+from limit_surface_ros.nodes.models.model_node import COMMON_SETTINGS
 from node_helpers import Program, planar_twist, wrench_message
 
 

@@ -14,8 +14,9 @@ from limit_surface_interfaces.msg import ErrorCode
 from limit_surface_interfaces.srv import WrenchesToTwists, WrenchToTwist
 
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
-from limit_surface_ros.nodes import batches, convert
 from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
+from limit_surface_ros.nodes.messages import convert
+from limit_surface_ros.nodes.serving import batches
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.scaling import Scaling
 from node_helpers import stamp_message, wrench_message

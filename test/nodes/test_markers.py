@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The promise of `nodes.markers`: what RViz shows is where the mathematics says it is."""
+"""What RViz shows is where the mathematics says it is (`nodes.limit_surface.markers`)."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ pytest.importorskip("visualization_msgs", reason="the messages are not installed
 from visualization_msgs.msg import Marker
 
 from limit_surface_ros.files.surface_file import SurfaceModel
-from limit_surface_ros.nodes import markers
-from limit_surface_ros.nodes.markers import Canvas
+from limit_surface_ros.nodes.limit_surface import markers
+from limit_surface_ros.nodes.limit_surface.markers import Canvas
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling

@@ -24,7 +24,7 @@ from limit_surface_ros.files.surface_file import (
     write_surface_model,
 )
 from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
-from limit_surface_ros.nodes.model_host import ModelHost
+from limit_surface_ros.nodes.models.model_host import ModelHost
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.kinds.polynomial import Polynomial
 from limit_surface_ros.surface.kinds.power_sum import PowerSum

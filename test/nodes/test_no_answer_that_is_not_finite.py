@@ -26,8 +26,8 @@ from limit_surface_interfaces.srv import (
 
 from decay_helpers import Bench
 from limit_surface_ros.errors import SolverError
-from limit_surface_ros.nodes.answers import FiniteCheck
 from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
+from limit_surface_ros.nodes.serving.answers import FiniteCheck
 from limit_surface_ros.surface.base import LimitSurface
 from node_helpers import twist_message, wrench_message
 

@@ -15,7 +15,7 @@ from limit_surface_interfaces.srv import ListDecays, ListModels
 
 from limit_surface_ros.nodes.decay_node import SETTINGS as DECAY_SETTINGS
 from limit_surface_ros.nodes.limit_surface_node import SETTINGS as SURFACE_SETTINGS
-from limit_surface_ros.nodes.model_node import COMMON_SETTINGS
+from limit_surface_ros.nodes.models.model_node import COMMON_SETTINGS
 from node_helpers import Program
 
 CONFIG = Path(__file__).parents[2] / "config"

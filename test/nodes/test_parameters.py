@@ -18,7 +18,7 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
 from limit_surface_ros.nodes.limit_surface_node import SETTINGS, LimitSurfaceNode
-from limit_surface_ros.nodes.model_node import COMMON_SETTINGS
+from limit_surface_ros.nodes.models.model_node import COMMON_SETTINGS
 from node_helpers import wrench_message
 
 TABLE = [*SETTINGS, *COMMON_SETTINGS]

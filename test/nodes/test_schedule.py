@@ -4,7 +4,7 @@
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from limit_surface_ros.nodes.onset_stream import LONGEST_DELAY, Schedule
+from limit_surface_ros.nodes.decay.onset_stream import LONGEST_DELAY, Schedule
 
 START = 1_700_000_000_000_000_000
 SECOND = 1_000_000_000

@@ -8,8 +8,8 @@ import math
 import pytest
 
 from limit_surface_ros.errors import RangeError, ShapeError
-from limit_surface_ros.nodes.diagnostics import CallbackTimes, Health, InputAge
-from limit_surface_ros.nodes.settings import Setting
+from limit_surface_ros.nodes.serving.diagnostics import CallbackTimes, Health, InputAge
+from limit_surface_ros.nodes.serving.settings import Setting
 
 
 def refuse(value):

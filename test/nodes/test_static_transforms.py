@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from limit_surface_ros.errors import FrameError, RangeError
-from limit_surface_ros.nodes.static_transforms import StaticTransforms
+from limit_surface_ros.nodes.messages.static_transforms import StaticTransforms
 
 WRENCH = np.array([1.0, -2.0, 3.0, 0.1, 0.2, -0.3])
 

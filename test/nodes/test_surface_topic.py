@@ -15,7 +15,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
-from limit_surface_ros.nodes import markers
+from limit_surface_ros.nodes.limit_surface import markers
 from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
 from node_helpers import wrench_message
 

@@ -191,7 +191,7 @@ def test_within_the_tolerance_the_newest_transform_is_taken(moving):
 
 
 def test_of_more_than_the_queue_holds_the_oldest_is_refused(moving, monkeypatch):
-    monkeypatch.setattr("limit_surface_ros.nodes.endpoints.MOST_WAITING", 3)
+    monkeypatch.setattr("limit_surface_ros.nodes.serving.endpoints.MOST_WAITING", 3)
     bench = moving(**PATIENT)
     bench.come(10 * SECOND, 0.1)
     for step in range(1, 6):

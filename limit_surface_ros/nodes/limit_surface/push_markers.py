@@ -11,14 +11,14 @@ from nav_msgs.msg import Path
 from visualization_msgs.msg import Marker, MarkerArray
 
 from limit_surface_ros.motion.outcomes import ContactMode
-from limit_surface_ros.nodes import markers
+from limit_surface_ros.nodes.limit_surface import markers
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.files.surface_file import SurfaceModel
     from limit_surface_ros.motion.outcomes import PushRun
     from limit_surface_ros.motion.outline import Outline
-    from limit_surface_ros.nodes.model_node import ModelNode
+    from limit_surface_ros.nodes.models.model_node import ModelNode
 
 OUTLINES, PATH = "push", "push_path"
 GHOSTS, TIP, CONTACTS, FORCES = "ghosts", "tip", "contacts", "forces"

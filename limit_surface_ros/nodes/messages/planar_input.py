@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from limit_surface_ros.errors import RangeError, shortened
-from limit_surface_ros.nodes import convert
-from limit_surface_ros.nodes.settings import Setting
+from limit_surface_ros.nodes.messages import convert
+from limit_surface_ros.nodes.serving.settings import Setting
 from limit_surface_ros.surface.frames import RigidTransform, out_of_plane
 
 if TYPE_CHECKING:
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.files.surface_file import SurfaceModel
-    from limit_surface_ros.nodes.frames import Frames
-    from limit_surface_ros.nodes.parameters import Parameters, Values
+    from limit_surface_ros.nodes.messages.frames import Frames
+    from limit_surface_ros.nodes.serving.parameters import Parameters, Values
     from limit_surface_ros.surface.base import LimitSurface
 
 

@@ -24,8 +24,8 @@ from limit_surface_ros.files.surface_file import (
     read_surface_model,
     write_surface_model,
 )
-from limit_surface_ros.nodes import convert
-from limit_surface_ros.nodes.settings import Setting
+from limit_surface_ros.nodes.messages import convert
+from limit_surface_ros.nodes.serving.settings import Setting
 
 if TYPE_CHECKING:
     from std_srvs.srv import Trigger

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from visualization_msgs.msg import Marker, MarkerArray
 
-from limit_surface_ros.nodes import markers
-from limit_surface_ros.nodes.settings import Setting
+from limit_surface_ros.nodes.limit_surface import markers
+from limit_surface_ros.nodes.serving.settings import Setting
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.files.surface_file import SurfaceModel
-    from limit_surface_ros.nodes.model_node import ModelNode
-    from limit_surface_ros.nodes.parameters import Values
+    from limit_surface_ros.nodes.models.model_node import ModelNode
+    from limit_surface_ros.nodes.serving.parameters import Values
     from limit_surface_ros.surface.base import LimitSurface
 
 TOPIC = "surface"

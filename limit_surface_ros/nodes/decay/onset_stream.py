@@ -11,7 +11,7 @@ from geometry_msgs.msg import Vector3Stamped, WrenchStamped
 from rclpy.clock import JumpThreshold
 from rclpy.duration import Duration
 
-from limit_surface_ros.nodes.convert import fill_stamp
+from limit_surface_ros.nodes.messages.convert import fill_stamp
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from geometry_msgs.msg import Wrench
     from rclpy.node import Node
 
-    from limit_surface_ros.nodes.endpoints import Output
-    from limit_surface_ros.nodes.onset import Onset
+    from limit_surface_ros.nodes.decay.onset import Onset
+    from limit_surface_ros.nodes.serving.endpoints import Output
 
 
 # What has been due for longer was missed: a stalled process does not flood its listeners [ns].

@@ -23,10 +23,10 @@ from limit_surface_ros.errors import (
     UnavailableError,
     shortened,
 )
-from limit_surface_ros.nodes.convert import nanoseconds
-from limit_surface_ros.nodes.endpoints import Waiting
-from limit_surface_ros.nodes.settings import Setting
-from limit_surface_ros.nodes.static_transforms import StaticTransforms
+from limit_surface_ros.nodes.messages.convert import nanoseconds
+from limit_surface_ros.nodes.messages.static_transforms import StaticTransforms
+from limit_surface_ros.nodes.serving.endpoints import Waiting
+from limit_surface_ros.nodes.serving.settings import Setting
 from limit_surface_ros.surface.frames import RigidTransform
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from rclpy.node import Node
     from std_msgs.msg import Header
 
-    from limit_surface_ros.nodes.parameters import Parameters, Values
+    from limit_surface_ros.nodes.serving.parameters import Parameters, Values
 
 SETTINGS = (
     Setting(

@@ -9,8 +9,8 @@ import numpy as np
 
 from limit_surface_ros.decay.response import Response
 from limit_surface_ros.errors import ZeroVectorError
-from limit_surface_ros.nodes import convert
-from limit_surface_ros.nodes.convert import fill_stamp, nanoseconds
+from limit_surface_ros.nodes.messages import convert
+from limit_surface_ros.nodes.messages.convert import fill_stamp, nanoseconds
 
 if TYPE_CHECKING:
     from geometry_msgs.msg import WrenchStamped

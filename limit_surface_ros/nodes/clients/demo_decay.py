@@ -13,13 +13,13 @@ from geometry_msgs.msg import InertiaStamped, WrenchStamped
 from limit_surface_interfaces.srv import EvaluateDecay, PredictSlide, PredictStop
 from rclpy.qos import QoSProfile
 
-from limit_surface_ros.nodes import convert
-from limit_surface_ros.nodes.convert import nanoseconds
+from limit_surface_ros.nodes.messages import convert
+from limit_surface_ros.nodes.messages.convert import nanoseconds
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from limit_surface_ros.nodes.service_client import ServiceClient
+    from limit_surface_ros.nodes.clients.service_client import ServiceClient
 
 MODEL = "exponential"
 TOLERANCE = 1e-6

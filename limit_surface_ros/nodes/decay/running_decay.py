@@ -14,13 +14,13 @@ from limit_surface_ros.checks import as_floats
 from limit_surface_ros.decay.tail import tail_of
 from limit_surface_ros.errors import DataError, FileError, RangeError, UnavailableError
 from limit_surface_ros.files.decay_file import DecayModel, write_decay_model
-from limit_surface_ros.nodes import convert
-from limit_surface_ros.nodes.batches import empty_rows
-from limit_surface_ros.nodes.endpoints import Service
-from limit_surface_ros.nodes.settings import Setting
+from limit_surface_ros.nodes.messages import convert
+from limit_surface_ros.nodes.serving.batches import empty_rows
+from limit_surface_ros.nodes.serving.endpoints import Service
+from limit_surface_ros.nodes.serving.settings import Setting
 
 if TYPE_CHECKING:
-    from limit_surface_ros.nodes.onset import Onset
+    from limit_surface_ros.nodes.decay.onset import Onset
 
 # A model's name is a part of its file's: nothing that leads out of the folder.
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,99}")

@@ -11,7 +11,7 @@ from geometry_msgs.msg import Point32, PoseStamped
 from limit_surface_interfaces.srv import SimulatePush, SimulatePushes
 
 if TYPE_CHECKING:
-    from limit_surface_ros.nodes.service_client import ServiceClient
+    from limit_surface_ros.nodes.clients.service_client import ServiceClient
 
 # The body of the default model: a right triangle about its centroid [m].
 CORNERS = ((-0.04, -0.04), (0.08, -0.04), (-0.04, 0.08))

@@ -27,13 +27,13 @@ from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
 from limit_surface_ros.errors import FileError, LimitSurfaceError, RangeError
-from limit_surface_ros.nodes.settings import Setting, help_of
+from limit_surface_ros.nodes.serving.settings import Setting, help_of
 from limit_surface_ros.runtime import keep_large_pieces
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
-    from limit_surface_ros.nodes.endpoints import Endpoints
+    from limit_surface_ros.nodes.serving.endpoints import Endpoints
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # What a user gets wrong at start is told in one line, without a traceback. rcl's errors, unknown

@@ -14,17 +14,17 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from limit_surface_ros.files.model_set import Model, Named
-from limit_surface_ros.nodes import diagnostics, parameters, spin
-from limit_surface_ros.nodes.endpoints import LOG_PERIOD, Endpoints, Waiting
-from limit_surface_ros.nodes.model_host import ModelHost
-from limit_surface_ros.nodes.parameters import Parameters
-from limit_surface_ros.nodes.peers import Peers
+from limit_surface_ros.nodes.models.model_host import ModelHost
+from limit_surface_ros.nodes.serving import diagnostics, parameters, spin
+from limit_surface_ros.nodes.serving.endpoints import LOG_PERIOD, Endpoints, Waiting
+from limit_surface_ros.nodes.serving.parameters import Parameters
+from limit_surface_ros.nodes.serving.peers import Peers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from pathlib import Path
 
-    from limit_surface_ros.nodes.settings import Setting
+    from limit_surface_ros.nodes.serving.settings import Setting
 
 # Models of a second kind.
 Model2 = TypeVar("Model2", bound=Named)

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.errors import UnavailableError
-from limit_surface_ros.nodes.endpoints import Waiting
+from limit_surface_ros.nodes.serving.endpoints import Waiting
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.nodes.endpoints import Endpoints
+    from limit_surface_ros.nodes.serving.endpoints import Endpoints
 
 # Time that one slice may take [s]: how long a topic waits in the middle of a batch.
 SLICE = 0.003

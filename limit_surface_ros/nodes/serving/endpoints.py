@@ -22,9 +22,9 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from std_srvs.srv import Trigger
 
 from limit_surface_ros.errors import LimitSurfaceError, UnavailableError, shortened
-from limit_surface_ros.nodes import answers
-from limit_surface_ros.nodes.diagnostics import Health, InputAge
-from limit_surface_ros.nodes.peers import LostMessages
+from limit_surface_ros.nodes.serving import answers
+from limit_surface_ros.nodes.serving.diagnostics import Health, InputAge
+from limit_surface_ros.nodes.serving.peers import LostMessages
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Iterator
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from rclpy.node import Node
     from rclpy.publisher import Publisher
 
-    from limit_surface_ros.nodes.peers import Peers
+    from limit_surface_ros.nodes.serving.peers import Peers
 
 LOG_PERIOD = 5.0
 DEPTH = 10

@@ -12,12 +12,12 @@ from ament_index_python.packages import PackageNotFoundError, get_package_share_
 
 from limit_surface_ros.errors import FileError, UnknownModelError
 from limit_surface_ros.files.model_set import Model, ModelSet, read_model_set
-from limit_surface_ros.nodes.settings import Setting
+from limit_surface_ros.nodes.serving.settings import Setting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from limit_surface_ros.nodes.parameters import Parameters, Values
+    from limit_surface_ros.nodes.serving.parameters import Parameters, Values
 
 _IN_PACKAGE = "package://"
 

@@ -17,8 +17,8 @@ from rclpy.exceptions import InvalidParameterTypeException, ParameterNotDeclared
 from rclpy.parameter import Parameter
 
 from limit_surface_ros.errors import LimitSurfaceError, RangeError, UnavailableError, shortened
-from limit_surface_ros.nodes import answers
-from limit_surface_ros.nodes.settings import Setting
+from limit_surface_ros.nodes.serving import answers
+from limit_surface_ros.nodes.serving.settings import Setting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable

@@ -11,15 +11,15 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks
 
-from limit_surface_ros.nodes.settings import Setting
+from limit_surface_ros.nodes.serving.settings import Setting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from rclpy.node import Node
 
-    from limit_surface_ros.nodes.parameters import Parameters, Values
-    from limit_surface_ros.nodes.peers import LostMessages, Mismatch, Peers
+    from limit_surface_ros.nodes.serving.parameters import Parameters, Values
+    from limit_surface_ros.nodes.serving.peers import LostMessages, Mismatch, Peers
 
 SETTINGS = (
     Setting(

@@ -21,9 +21,9 @@ from limit_surface_ros.motion.rollout import (
     push_run_steps,
     push_steps,
 )
-from limit_surface_ros.nodes import convert
-from limit_surface_ros.nodes.endpoints import Service
-from limit_surface_ros.nodes.planar_input import wrench_at_origin
+from limit_surface_ros.nodes.messages import convert
+from limit_surface_ros.nodes.messages.planar_input import wrench_at_origin
+from limit_surface_ros.nodes.serving.endpoints import Service
 from limit_surface_ros.surface.frames import RigidTransform
 
 if TYPE_CHECKING:

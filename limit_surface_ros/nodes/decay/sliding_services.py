@@ -29,11 +29,11 @@ from limit_surface_ros.motion.slip import (
     predict_slip,
     required_share,
 )
-from limit_surface_ros.nodes import convert
-from limit_surface_ros.nodes.convert import SECOND, nanoseconds
-from limit_surface_ros.nodes.endpoints import Service
-from limit_surface_ros.nodes.planar_input import twist_at_origin
-from limit_surface_ros.nodes.settings import Setting
+from limit_surface_ros.nodes.messages import convert
+from limit_surface_ros.nodes.messages.convert import SECOND, nanoseconds
+from limit_surface_ros.nodes.messages.planar_input import twist_at_origin
+from limit_surface_ros.nodes.serving.endpoints import Service
+from limit_surface_ros.nodes.serving.settings import Setting
 
 if TYPE_CHECKING:
     from collections.abc import Generator
