@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 # Angle [rad] beyond which two ways to compute one wrench agree on the side of a corner.
 _ROUNDING = 2e-15
+# Turning rate, in parts of its unit, that sets a resting support point in motion.
+_REST = 1e-13
 # The side to which pushers of each mode slide.
 _SIDES = np.array([0.0, 1.0, -1.0, 0.0])
 
@@ -50,11 +52,7 @@ class Contacts(NamedTuple):
 
     def wrenches(self, forces: Complexes) -> Floats:
         """Return wrenches (m, 3) of forces, given from the normals."""
-        turned = self.normals * forces
-        loads = np.empty((len(turned), 3))
-        loads[:, 0], loads[:, 1] = turned.real, turned.imag
-        loads[:, 2] = (np.conj(self.points) * turned).imag
-        return loads
+        return loads_at(self.points, self.normals * forces)
 
     def take(self, rows: Places | Bools) -> Contacts:
         """Return some of the pushes."""
@@ -184,15 +182,20 @@ class PushBatch:
         rates = low
         if len(jumps):
             # Support points stand still in between: their loads fill the range without a moment.
-            _, more = self._turned(motion[:, jumps], turn[:, jumps], high[jumps])
-            below, above = (_moments(contacts.points[jumps], w) for w in (loads[jumps], more))
+            # They count as at rest, and add nothing, up to some way from there.
+            apart = _REST * (1.0 + np.abs(low[jumps]))
+            line, about = (motion[:, jumps], turn[:, jumps]), contacts.points[jumps]
+            less, more = (
+                self._turned(*line, ends)[1] for ends in (low[jumps] - apart, high[jumps] + apart)
+            )
+            below, above = (_moments(about, each) for each in (less, more))
             crossed = below < above
             share = np.where(crossed, below / np.where(crossed, below - above, 1.0), 0.5)
             share = np.clip(share, 0.0, 1.0)
             rates = low.copy()
             rates[jumps] += share * (high[jumps] - low[jumps])
-            loads[jumps] += share[:, np.newaxis] * (more - loads[jumps])
-            twists[jumps] = self._line_twists(motion[:, jumps], turn[:, jumps], rates[jumps])
+            loads[jumps] = less + share[:, np.newaxis] * (more - less)
+            twists[jumps] = self._line_twists(*line, rates[jumps])
         force = np.conj(contacts.normals) * (loads[:, 0] + 1j * loads[:, 1])
         edges = contacts.edges
         beyond = np.abs(force.imag) * edges.real > force.real * edges.imag
@@ -222,6 +225,14 @@ def _moments(points: Complexes, wrenches: Floats) -> Floats:
     """Return the moments (m,) of wrenches (m, 3) about points."""
     force = wrenches[:, 0] + 1j * wrenches[:, 1]
     return np.asarray(wrenches[:, 2] - (np.conj(points) * force).imag)
+
+
+def loads_at(points: Complexes, forces: Complexes) -> Floats:
+    """Return wrenches (m, 3) of forces (m,) through points [m]."""
+    loads = np.empty((len(forces), 3))
+    loads[:, 0], loads[:, 1] = forces.real, forces.imag
+    loads[:, 2] = (np.conj(points) * forces).imag
+    return loads
 
 
 def contact_velocities(points: Complexes, twists: Floats) -> Complexes:

@@ -69,6 +69,24 @@ def pairs(name: str, values: ArrayLike) -> Floats:
     return array
 
 
+def same_pairs(**values: ArrayLike) -> tuple[list[Floats], tuple[int, ...]]:
+    """Return arrays that hold one pair each, (2,), or as many, (n, 2), as rows, and their lead.
+
+    Raises:
+        ShapeError: A shape is another, or they differ.
+        NotFiniteError: A number is NaN or infinite.
+    """
+    arrays = {name: as_floats(name, each) for name, each in values.items()}
+    shapes = [array.shape for array in arrays.values()]
+    lead = shapes[0][:-1]
+    if len(lead) > 1 or any(shape != (*lead, 2) for shape in shapes):
+        raise ShapeError(
+            f"{', '.join(arrays)} must all have shape (2,), or (n, 2), "
+            f"got {', '.join(map(str, shapes))}"
+        )
+    return [array.reshape(-1, 2) for array in arrays.values()], lead
+
+
 def as_complex(vectors: Floats) -> Complexes:
     """Return vectors (m, 2) as complex numbers (m,)."""
     return np.ascontiguousarray(vectors).view(np.complex128)[:, 0]

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pushes of every kind of surface are right at every friction and in every direction."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,61 +9,13 @@ from scipy.optimize import least_squares
 
 from limit_surface_ros.errors import NotFiniteError, RangeError, ShapeError, ZeroVectorError
 from limit_surface_ros.motion.push import MODES, ContactMode, push, pushes
-from limit_surface_ros.surface.base import LimitSurface
-from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
-from limit_surface_ros.surface.kinds.polynomial import MONOMIALS, Polynomial
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
-from limit_surface_ros.surface.shape import Shape
+from push_helpers import KINDS, SCALING, Box, mirrored, random_contacts
 
-SCALING = Scaling(0.05, 2.0)
 FRICTIONS = (0.0, 0.3, 1.0, 1.5, 3.0, 10.0, 1e4, 1e8, 1e15, np.inf)
 STICK, LEFT, RIGHT = range(3)
-
-
-def matrices(rng, count, rank=3):
-    factors = rng.standard_normal((count, 3, rank))
-    return factors @ factors.transpose(0, 2, 1)
-
-
-def quartic(rng):
-    """A convex quartic: the square of one ellipsoid, and a little of other fourth powers."""
-    coefficients = np.zeros(15)
-    a = matrices(rng, 1)[0] + np.eye(3)
-    squares = {(i, j): a[i, j] for i in range(3) for j in range(3)}
-    for (i, j), x in squares.items():
-        for (k, m), y in squares.items():
-            powers = np.bincount([i, j, k, m], minlength=3)
-            coefficients[(powers == MONOMIALS).all(axis=1)] += x * y
-    for powers in ([4, 0, 0], [0, 4, 0], [0, 0, 4]):
-        coefficients[(np.array(powers) == MONOMIALS).all(axis=1)] += rng.uniform(0.0, 1.0)
-    return Polynomial(coefficients, SCALING)
-
-
-KINDS = {
-    "ellipsoid": lambda rng: PowerSum.thesis(matrices(rng, 1), SCALING),
-    "norms": lambda rng: PowerSum.norms(matrices(rng, 3), SCALING),
-    "norms with corners": lambda rng: PowerSum.norms(
-        np.concatenate([matrices(rng, 2, 2), matrices(rng, 1)]), SCALING
-    ),
-    "two powers": lambda rng: PowerSum.thesis(matrices(rng, 2), SCALING),
-    "polynomial": quartic,
-    "dissipation": lambda rng: Dissipation(matrices(rng, 5), SCALING),
-    "facets": lambda rng: Dissipation(matrices(rng, 3, 2), SCALING),
-    "points": lambda rng: PointContacts(
-        0.05 * rng.standard_normal((4, 2)), rng.uniform(0.2, 2.0, 4), SCALING
-    ),
-}
-
-
-def random_contacts(rng, count):
-    points = 0.05 * rng.standard_normal((count, 2))
-    angle = rng.uniform(-np.pi, np.pi, count)
-    heading = angle + rng.uniform(-1.57, 1.57, count)
-    normals = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    velocities = 0.01 * np.stack([np.cos(heading), np.sin(heading)], axis=1)
-    return points, normals, velocities
 
 
 def wrong(surface, points, normals, friction, velocities, found):
@@ -137,22 +87,11 @@ def test_a_mirror_swaps_left_and_right(kind):
     rng = np.random.default_rng(11)
     surface = KINDS[kind](rng)
     flip, turned = np.array([1.0, -1.0]), np.array([1.0, -1.0, -1.0])
-    if isinstance(surface, PowerSum):
-        mirrored = PowerSum(
-            surface.matrices * np.outer(turned, turned), surface.exponents, SCALING
-        )
-    elif isinstance(surface, Dissipation):
-        mirrored = Dissipation(surface.matrices * np.outer(turned, turned), SCALING)
-    elif isinstance(surface, PointContacts):
-        mirrored = PointContacts(surface.points * flip, surface.friction_limits, SCALING)
-    else:
-        mirrored = Polynomial(
-            surface.coefficients * (-1.0) ** MONOMIALS[:, 1:].sum(axis=1), SCALING
-        )
+    seen = mirrored(surface)
     for friction in (0.2, 1.5, 1e6, np.inf):
         points, normals, velocities = random_contacts(rng, 60)
         here = pushes(surface, points, normals, friction, velocities)
-        there = pushes(mirrored, points * flip, normals * flip, friction, velocities * flip)
+        there = pushes(seen, points * flip, normals * flip, friction, velocities * flip)
         np.testing.assert_array_equal(np.array([0, 2, 1])[here.modes], there.modes)
         np.testing.assert_allclose(
             here.twists / SCALING.twist_unit,
@@ -255,33 +194,6 @@ def test_pushes_agree_with_an_independent_complementarity_solve(kind):
             assert np.abs(answers - twist).max(axis=1).max() < 1e-6
     # The root finder fails now and then; it must not fail so often that nothing is compared.
     assert met >= 5
-
-
-class BoxShape(Shape):
-    """Loads of which no component is above 1."""
-
-    def load_factors(self, loads):
-        return np.abs(loads).max(axis=0)
-
-    def motions(self, loads):
-        largest = np.abs(loads).argmax(axis=0), np.arange(loads.shape[1])
-        motions = np.zeros_like(loads)
-        motions[largest] = np.sign(loads[largest])
-        return motions
-
-    def loads(self, motions):
-        return np.sign(motions)
-
-
-@dataclass(frozen=True, eq=False)
-class Box(LimitSurface):
-    """A kind that the package does not know: loads of which no component is above its limit."""
-
-    kind = "box"
-    scaling: Scaling = SCALING
-
-    def _new_shape(self):
-        return BoxShape()
 
 
 @pytest.mark.parametrize("friction", [0.4, np.inf])
