@@ -199,6 +199,26 @@ def test_a_table_that_is_expected_to_pay_spares_the_search(count):
     assert counted.asked - spent < 1000
 
 
+@pytest.mark.parametrize("kind", ["norms", "powers", "dissipation", "points", "polynomial"])
+def test_a_single_vector_is_read_from_the_table_without_a_search(kind):
+    tabulated = surface_of(kind, 1).shape.solver
+    while not isinstance(tabulated, Tabulated):
+        tabulated = tabulated._solver
+    counted = Counted(tabulated._solver)
+    read = Tabulated(tabulated._gauge, counted, scalar=tabulated._scalar)
+    read.expect(np.inf)
+    spent = counted.asked
+    normals = np.random.default_rng(0).standard_normal((400, 3))
+    points = [read.solve_scalar(tuple(normal)) for normal in normals.tolist()]
+    assert counted.asked == spent
+    certain = np.array([point is not None for point in points])
+    # Corners have cones of normals in which nothing can be read.
+    assert certain.mean() > (0.3 if kind == "points" else 0.8)
+    exact, _ = counted.solve(normals[certain].T)
+    found = np.array([point for point in points if point is not None]).T
+    np.testing.assert_allclose(found, exact, atol=1e-9 * np.abs(exact).max())
+
+
 def test_one_large_batch_makes_the_table_that_it_is_answered_from():
     surface = surface_of("norms", 1)
     twists = np.random.default_rng(0).standard_normal((50_000, 3))

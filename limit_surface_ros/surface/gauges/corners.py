@@ -72,54 +72,58 @@ class Corners:
             Distances (m,) from the axis of the cone in its own radii, at most 1 within it; and
             points (3, m), not scaled: exact within the cone, of second order beyond.
         """
-        which = self._nearest(normals)
-        points = self.points.T.take(which, axis=1)
-        power = (points * normals).sum(axis=0)
-        power[np.abs(power) < _NO_POWER] = _NO_POWER
-        inverses = np.moveaxis(self.inverses, 0, -1).take(which, axis=2)
-        q = (inverses * normals).sum(axis=1) / power - self.centres.T.take(which, axis=1)
-        distance = np.sqrt(q[0] * q[0] + q[1] * q[1])
-        # The rim belongs to the cone.
-        distance[distance <= 1.0 + RIM] = 1.0
+        distance, points, which = self._cones(normals)
         beyond = np.flatnonzero(distance > 1.0)
         if len(beyond):
             points[:, beyond] += self._offsets(
-                which[beyond],
-                *(each.take(beyond, axis=-1) for each in (normals / power, q, distance)),
+                which[beyond], normals.take(beyond, axis=1), distance[beyond]
             )
-        points *= np.sign(power)
         return distance, points
 
-    def _offsets(self, which: Places, normals: Floats, q: Floats, distance: Floats) -> Floats:
+    def _cones(self, normals: Floats) -> tuple[Floats, Floats, Places]:
+        """Return distances as in `nearest`, the corners themselves (3, m), and which they are."""
+        distance: Floats = np.empty(normals.shape[1])
+        points: Floats = np.empty_like(normals)
+        which: Places = np.empty(normals.shape[1], dtype=np.intp)
+        count = max(1, _ELEMENTS // len(self.points))
+        for start in range(0, len(which), count):
+            block = slice(start, start + count)
+            columns = normals[:, block]
+            powers = self.points @ columns
+            # A normal without power is infinitely far: a large number will do, and no warning.
+            powers[np.abs(powers) < _NO_POWER] = _NO_POWER
+            np.divide(1.0, powers, out=powers)
+            squares = self.inverses[:, 0] @ columns
+            second = self.inverses[:, 1] @ columns
+            for arms, centre in ((squares, self.centres[:, :1]), (second, self.centres[:, 1:])):
+                arms *= powers
+                arms -= centre
+                arms *= arms
+            squares += second
+            nearest = squares.argmin(axis=0)
+            chosen = nearest, np.arange(len(nearest))
+            np.sqrt(squares[chosen], out=distance[block])
+            points[:, block] = self.points.T.take(nearest, axis=1) * np.sign(powers[chosen])
+            which[block] = nearest
+        # The rim belongs to the cone.
+        distance[distance <= 1.0 + RIM] = 1.0
+        return distance, points, which
+
+    def _offsets(self, which: Places, normals: Floats, distance: Floats) -> Floats:
         """Return the steps (3, m) from corners to the points to expect beyond their cones.
 
         To second order the gauge beside a corner is |y| - q.y + y'My/2 in y = R_k (x - x_k), which
         is least near y along q.
         """
+        corners = self.points.T.take(which, axis=1)
+        powers = (corners * normals).sum(axis=0)
+        powers[np.abs(powers) < _NO_POWER] = _NO_POWER
+        normals = normals / powers
+        inverses = np.moveaxis(self.inverses, 0, -1).take(which, axis=2)
+        q = (inverses * normals).sum(axis=1) - self.centres.T.take(which, axis=1)
         matrices = np.moveaxis(self.curvatures, 0, -1).take(which, axis=2)
         curvature = ((matrices * q).sum(axis=1) * q).sum(axis=0) + FLAT * distance**2
         y = q * ((distance - 1.0) * distance / curvature)
-        inverses = np.moveaxis(self.inverses, 0, -1).take(which, axis=2)
-        step = (inverses * y[:, np.newaxis]).sum(axis=0)
-        return np.asarray(step - self.points.T.take(which, axis=1) * (normals * step).sum(axis=0))
-
-    def _nearest(self, normals: Floats) -> Places:
-        """Return which corner is nearest to each normal, (m,)."""
-        which = np.empty(normals.shape[1], dtype=np.intp)
-        count = max(1, _ELEMENTS // len(self.points))
-        for start in range(0, len(which), count):
-            block = slice(start, start + count)
-            rows = normals[:, block].T
-            powers = rows @ self.points.T
-            # A normal without power is infinitely far: a large number will do, and no warning.
-            powers[np.abs(powers) < _NO_POWER] = _NO_POWER
-            np.divide(1.0, powers, out=powers)
-            squares = rows @ self.inverses[:, 0].T
-            second = rows @ self.inverses[:, 1].T
-            for arms, centre in ((squares, self.centres[:, 0]), (second, self.centres[:, 1])):
-                arms *= powers
-                arms -= centre
-                arms *= arms
-            squares += second
-            which[block] = squares.argmin(axis=1)
-        return which
+        steps = (inverses * y[:, np.newaxis]).sum(axis=0)
+        steps -= corners * (normals * steps).sum(axis=0)
+        return np.asarray(steps * np.sign(powers))

@@ -116,10 +116,10 @@ class _QuarticShape(GaugeShape):
         directions = even_directions(2 * _STARTS).T
         if proves_convex(quartic):
             newton = SmallBatch(ConvexNewton(quartic, directions), scalar)
-            return InFrame(frame, Tabulated(quartic, newton))
+            return InFrame(frame, Tabulated(quartic, newton, scalar=scalar))
         search = PeakSearch(quartic, directions[:, _STARTS:])
         peaks = SmallBatch(search, scalar, few=_FEW_WITH_PEAKS)
-        return InFrame(frame, Tabulated(quartic, peaks, convex=False))
+        return InFrame(frame, Tabulated(quartic, peaks, scalar=scalar, convex=False))
 
 
 def _check_positive(quartic: Quartic) -> None:

@@ -98,7 +98,8 @@ def _solver_of_norms(roots: Floats) -> SupportSolver:
     newton = ConvexNewton(gauge, even_directions(_STARTS).T, corners)
     if len(roots) > FEW_TERMS:
         return Tabulated(gauge, newton)
-    return Tabulated(gauge, SmallBatch(newton, NormSumScalar(roots), corners))
+    scalar = NormSumScalar(roots)
+    return Tabulated(gauge, SmallBatch(newton, scalar, corners), scalar=scalar)
 
 
 def points_solver(gauge: PointNormSum) -> SupportSolver:
@@ -127,4 +128,5 @@ def _solver_of_points(gauge: PointNormSum) -> SupportSolver:
     newton = ConvexNewton(gauge, starts, corners)
     if len(gauge.limits) > FEW_TERMS:
         return Tabulated(gauge, newton)
-    return Tabulated(gauge, SmallBatch(newton, NormSumScalar(gauge.roots()), corners))
+    scalar = NormSumScalar(gauge.roots())
+    return Tabulated(gauge, SmallBatch(newton, scalar, corners), scalar=scalar)

@@ -70,14 +70,14 @@ def power_sum_solver(roots: Floats, exponents: Floats) -> SupportSolver:
         return InFrame(frame, _convex_solver(gauge, scalar))
     search = PeakSearch(gauge, _starts(roots, exponents))
     peaks = SmallBatch(search, scalar, few=_FEW_WITH_PEAKS)
-    tabulated = Tabulated(gauge, peaks, convex=False)
+    tabulated = Tabulated(gauge, peaks, scalar=scalar, convex=False)
     return InFrame(frame, _with_spikes(tabulated, roots, exponents))
 
 
 def _convex_solver(gauge: NormSum | PowerSumGauge, scalar: ScalarGauge) -> SupportSolver:
     corners = gauge.corners()
     newton = ConvexNewton(gauge, even_directions(_CONVEX_STARTS).T, corners)
-    return Tabulated(gauge, SmallBatch(newton, scalar, corners))
+    return Tabulated(gauge, SmallBatch(newton, scalar, corners), scalar=scalar)
 
 
 class Ellipsoid(SupportSolver):

@@ -81,14 +81,7 @@ class SmallBatch(SupportSolver):
         """Return support points and powers; see `SupportSolver`."""
         if normals.shape[1] > self._few:
             return self._solver.solve(normals)
-        points: Floats = np.empty_like(normals)
-        for column, (x, y, z) in enumerate(normals.T.tolist()):
-            found = self.solve_scalar((x, y, z))
-            if found is None:
-                points[:, [column]] = self._solver.solve(normals[:, [column]])[0]
-            else:
-                points[:, column] = found
-        return points, (normals * points).sum(axis=0)
+        return one_by_one(self, self._solver, normals)
 
     def solve_scalar(self, normal: Vector) -> Vector | None:
         """Return one support point; see `SupportSolver`."""
@@ -197,6 +190,24 @@ class SmallBatch(SupportSolver):
     def expect(self, count: float) -> None:
         """Make what pays if so many normals come; see `SupportSolver`."""
         self._solver.expect(count)
+
+
+def one_by_one(few: SupportSolver, many: SupportSolver, normals: Floats) -> tuple[Floats, Floats]:
+    """Return support points and powers for few normals; see `SupportSolver.solve`.
+
+    Args:
+        few: Solves one normal after another.
+        many: Solves what that leaves.
+        normals: Shape (3, m).
+    """
+    points: Floats = np.empty_like(normals)
+    for column, (x, y, z) in enumerate(normals.T.tolist()):
+        found = few.solve_scalar((x, y, z))
+        if found is None:
+            points[:, [column]] = many.solve(normals[:, [column]])[0]
+        else:
+            points[:, column] = found
+    return points, (normals * points).sum(axis=0)
 
 
 def _product(a: Sequence[float], b: Sequence[float]) -> float:

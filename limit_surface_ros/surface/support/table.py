@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from limit_surface_ros.surface.support.solvers import SupportSolver
 
 # Cells of the table along each axis of the chart.
-_CELLS = 80
+CELLS = 80
 # Powers of x and y in a cell's polynomial, those of y one after the other for each of x.
 _DEGREE = 5
 _POWERS = [(i, j) for i in range(_DEGREE + 1) for j in range(_DEGREE + 1 - i)]
@@ -35,20 +35,20 @@ _PLANE = [_POWERS.index(powers) for powers in ((0, 0), (1, 0), (0, 1))]
 # Derivatives along x and y of what is read: the height, its slopes and its second derivatives.
 _ORDERS = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
 # Vectors for which one is solved to make a table.
-SAMPLES = (2 * _CELLS + 1) ** 2
+SAMPLES = (2 * CELLS + 1) ** 2
 # Steps along the curvature until a point counts as hard.
-_STEPS = 6
+STEPS = 6
 # Lengths in the chart of steps that prove a point in any cell, and in none.
 _SHORT_STEP, _LONG_STEP = 1e-10, 1e-5
 # Between these a step is the last if it leaves errors below these: in the chart, which is the part
 # of a step that is known of the cell, and off the surface, which grows with a step's square. Both
 # are known of few places in a cell, so that more is taken.
-_ERROR = 3e-11
+STEP_ERROR = 3e-11
 _OFF = 1e-12
 # Length of a step that never leads from the surface by more than rounding.
-_NEAR = 1e-7
+NEAR = 1e-7
 _ROUNDING = 1e-15
-_MORE = 4.0
+MORE = 4.0
 # Error of a cell's polynomial, in parts of D, above which two sheets may meet in the cell: their
 # slopes differ there, and a slope within a cell is about a hundredth of that on the chart.
 _SMOOTH = 1e-6
@@ -77,11 +77,11 @@ class SupportTable:
             SolverError: A point could not be certified.
         """
         self._gauge = gauge
-        places = _grid(np.linspace(-1.0, 1.0, 2 * _CELLS + 1))
+        places = _grid(np.linspace(-1.0, 1.0, 2 * CELLS + 1))
         normals = _normals(places)
         points, height = solver.solve(normals)
         slopes = points[:2] - points[2] * places
-        samples = np.array([height, *slopes / _CELLS]).reshape(3, 2 * _CELLS + 1, -1)
+        samples = np.array([height, *slopes / CELLS]).reshape(3, 2 * CELLS + 1, -1)
         coefficients, misfit = _quintics(samples)
         # Height and slopes in the middle of a cell are most of those elsewhere in it. What is lost
         # of the rest in single precision is mended by the steps that follow.
@@ -90,9 +90,9 @@ class SupportTable:
         with np.errstate(over="ignore", under="ignore"):
             self._coefficients = coefficients.astype(np.float32)
         # A cell that proves nothing, as within a corner's cone, is not worth reading.
-        self._useful: Bools = np.ones(_CELLS**2, dtype=bool)
-        self._last_step: Floats = np.full(_CELLS**2, _SHORT_STEP)
-        middles = _normals(_grid((np.arange(2 * _CELLS) + 0.5) / _CELLS - 1.0))
+        self._useful: Bools = np.ones(CELLS**2, dtype=bool)
+        self._last_step: Floats = np.full(CELLS**2, _SHORT_STEP)
+        middles = _normals(_grid((np.arange(2 * CELLS) + 0.5) / CELLS - 1.0))
         _, certain = self.points(middles)
         self._last_step = np.asarray(_of_cells(self._last_steps(middles)).min(axis=0))
         if convex:
@@ -123,6 +123,18 @@ class SupportTable:
         points *= sign
         return points, certain
 
+    def cell(self, number: int) -> tuple[list[float], float] | None:
+        """Return the derivatives of h (21) in a cell's middle, and how long a last step may be.
+
+        None stands for a cell that proves nothing.
+        """
+        if not self._useful[number]:
+            return None
+        derivatives: list[float] = self._coefficients[:, number].tolist()
+        for place, derivative in zip(_PLANE, self._planes[:, number].tolist(), strict=True):
+            derivatives[place] = derivative
+        return derivatives, float(self._last_step[number])
+
     def _prove(self, place: Floats, cell: Places, within: Floats) -> tuple[Floats, Bools]:
         """Return points (3, m) for places (2, m) in cells (m,), and which are certain (m,)."""
         points, local = self._read(place, cell, within)
@@ -131,7 +143,7 @@ class SupportTable:
         certain = away <= last_step
         todo = np.flatnonzero(~certain)
         before = away.take(todo)
-        for _ in range(_STEPS - 1):
+        for _ in range(STEPS - 1):
             if len(todo) == 0:
                 break
             points[:, todo], away = self._step(
@@ -139,7 +151,7 @@ class SupportTable:
             )
             done = away <= last_step.take(todo)
             # Or the step before has left so little that this one leaves nothing.
-            done |= (away <= _NEAR) & (_MORE * away * away <= _ERROR * before)
+            done |= (away <= NEAR) & (MORE * away * away <= STEP_ERROR * before)
             certain[todo] = done
             todo, before = todo[~done], away[~done]
         return points, certain
@@ -152,9 +164,9 @@ class SupportTable:
             points, first = self._step(points, place, local)
             values, _ = self._gauge.values_and_normals(points)
             _, second = self._step(points, place, local)
-            straight = _ERROR / _MORE * first / second
+            straight = STEP_ERROR / MORE * first / second
             off = np.maximum(np.abs(values - 1.0) - _ROUNDING, 0.0)
-            near = first * np.sqrt(_OFF / _MORE / off)
+            near = first * np.sqrt(_OFF / MORE / off)
             allowed = np.minimum(straight, near)
         # NaN, of a step from nowhere, is a hard place.
         allowed[~(allowed > _SHORT_STEP)] = _SHORT_STEP
@@ -200,8 +212,8 @@ class SupportTable:
         height += rest[0]
         slope_a += rest[1]
         slope_b += rest[2]
-        slope_a *= _CELLS
-        slope_b *= _CELLS
+        slope_a *= CELLS
+        slope_b *= CELLS
         lift = 2.0 / (1.0 + a * a + b * b)
         local[:2], local[2] = place, lift
         points: Floats = np.empty((3, len(cell)))
@@ -241,17 +253,17 @@ class SupportTable:
         for place_of, (order_a, order_b) in zip(found.reshape(6, -1), _ORDERS, strict=True):
             last = _DEGREE + 1 - order_b
             _sum_of_products(sums[order_b, order_a:last], in_a[: last - order_a], place_of)
-        found[1] *= _CELLS**2
+        found[1] *= CELLS**2
         return found[0], found[1]
 
 
 def _cells_of(place: Floats) -> tuple[Places, Floats]:
     """Return the cells' numbers (m,) of places (2, m), and where within these they are (2, m)."""
-    count = (0.5 * _CELLS) * (place + 1.0)
-    index = np.minimum(count.astype(np.intp), _CELLS - 1)
+    count = (0.5 * CELLS) * (place + 1.0)
+    index = np.minimum(count.astype(np.intp), CELLS - 1)
     count -= index
     row, column = index
-    return row * _CELLS + column, 2.0 * count - 1.0
+    return row * CELLS + column, 2.0 * count - 1.0
 
 
 def _grid(ticks: Floats) -> Floats:
@@ -282,7 +294,7 @@ def _sum_of_products(first: Any, second: Any, out: Any) -> None:
 
 def _of_cells(middles: Any) -> Any:
     """Return what holds in the middles of the quarters of each cell, shape (4, cells)."""
-    quarters = middles.reshape(_CELLS, 2, _CELLS, 2)
+    quarters = middles.reshape(CELLS, 2, CELLS, 2)
     return np.asarray(np.moveaxis(quarters, 2, 1).reshape(-1, 4).T)
 
 

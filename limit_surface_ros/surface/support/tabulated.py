@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limit_surface_ros.surface.support.small_batch import FEW, one_by_one
 from limit_surface_ros.surface.support.solvers import SupportSolver
 from limit_surface_ros.surface.support.table import SAMPLES, SupportTable
+from limit_surface_ros.surface.support.table_scalar import TableScalar
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.gauges.gauge import FirstOrder, Vector
+    from limit_surface_ros.surface.gauges.gauge import FirstOrder, ScalarGauge, Vector
 
 # A table pays for a batch of so many times the vectors that are solved to make it.
 _PAYS = 1.3
@@ -32,6 +34,7 @@ class Tabulated(SupportSolver):
         gauge: FirstOrder,
         solver: SupportSolver,
         *,
+        scalar: ScalarGauge | None = None,
         convex: bool = True,
         ahead: bool = True,
     ) -> None:
@@ -40,6 +43,7 @@ class Tabulated(SupportSolver):
         Args:
             gauge: Of the surface g = 1.
             solver: For its support points.
+            scalar: The gauge for one point, if plain floats are quicker.
             convex: Whether a point with the wanted normal is the answer for that alone.
             ahead: Whether a table is worth its time before any large batch is there.
         """
@@ -47,7 +51,9 @@ class Tabulated(SupportSolver):
         self._gauge = gauge
         self._solver = solver
         self._convex = convex
+        self._scalar = scalar
         self._table: SupportTable | None = None
+        self._one: TableScalar | None = None
 
     def solve(self, normals: Floats) -> tuple[Floats, Floats]:
         """Return support points and powers; see `SupportSolver`."""
@@ -55,19 +61,25 @@ class Tabulated(SupportSolver):
         table = self._table
         if table is None:
             return self._solver.solve(normals)
+        if self._one is not None and normals.shape[1] <= FEW:
+            return one_by_one(self, self._solver, normals)
         points, certain = table.points(normals)
         hard = np.flatnonzero(~certain)
         if len(hard):
-            points[:, hard] = self._solver.solve(normals[:, hard])[0]
+            points[:, hard] = self._solver.solve(normals.take(hard, axis=1))[0]
         return points, np.einsum("im,im->m", normals, points)
 
     def solve_scalar(self, normal: Vector) -> Vector | None:
         """Return one support point in plain floats; see `SupportSolver`."""
-        return self._solver.solve_scalar(normal)
+        one = self._one
+        point = None if one is None else one.point(normal)
+        return self._solver.solve_scalar(normal) if point is None else point
 
     def expect(self, count: float) -> None:
         """Make the table if it pays for so many normals at once."""
         if count == inf and not self._ahead:
             return
         if self._table is None and count >= _PAYS * SAMPLES:
-            self._table = SupportTable(self._gauge, self._solver, convex=self._convex)
+            table = SupportTable(self._gauge, self._solver, convex=self._convex)
+            self._one = None if self._scalar is None else TableScalar(table, self._scalar)
+            self._table = table
