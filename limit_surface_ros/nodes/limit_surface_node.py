@@ -240,7 +240,7 @@ async def wrenches_to_twists(
         twists[part] = convert.finite_rows("twists", found, part.start)
         factors[part] = convert.finite_rows("load_factors", found_factors, part.start)
 
-    await node.batches.run(len(rows), work)
+    await node.batches.run("wrenches_to_twists", surface.shape, len(rows), work)
     response.twists, response.load_factors = flat_twists, flat_factors
     convert.fill_header(response.header, request.header, policy.frame_of(model))
 
@@ -267,7 +267,7 @@ async def twists_to_wrenches(
         found = found if back is None else found @ back
         wrenches[part] = convert.finite_rows("wrenches", found, part.start)
 
-    await node.batches.run(len(rows), work)
+    await node.batches.run("twists_to_wrenches", surface.shape, len(rows), work)
     response.wrenches, response.powers = flat_wrenches, flat_powers
     convert.fill_header(response.header, request.header, policy.frame_of(model))
 

@@ -76,7 +76,7 @@ async def evaluate(
             values[part] = model.sum(times[part])
             bounds[part] = model.bounds(times[part])
 
-        await node.batches.run(len(times), work)
+        await node.batches.run("evaluate", model.sum, len(times), work)
         response.values, response.bounds = flat_values, flat_bounds
     response.bound = model.max_error
     response.bound_from, response.bound_until = model.time_span

@@ -6,7 +6,9 @@ from __future__ import annotations
 import collections
 import time
 from array import array
+from math import ceil
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -21,8 +23,8 @@ if TYPE_CHECKING:
 
 # Time that one slice may take [s]: how long a topic waits in the middle of a batch.
 SLICE = 0.003
-# Rows of the first slice, of which it is learnt how long rows take; a batch of so many is answered
-# in one slice and waits for no other.
+# Rows of the first slice of all, of which it is learnt how long rows take; a batch of so many is
+# answered in one slice and waits for no other.
 FIRST_ROWS = 1024
 # Bytes of the requests that wait for their turn; what more come are refused.
 MOST_BYTES = 2**28
@@ -41,12 +43,18 @@ class Batches:
         self._running = False
         self._queue: collections.deque[Waiting] = collections.deque()
         self._bytes = 0
+        # Rows that a slice may have, by what they are rows for and what is done with them.
+        self._counts: WeakKeyDictionary[object, dict[str, int]] = WeakKeyDictionary()
         endpoints.when_ending.append(self._refuse_next)
 
-    async def run(self, rows: int, work: Callable[[slice], None]) -> None:
+    async def run(
+        self, name: str, model: object, rows: int, work: Callable[[slice], None]
+    ) -> None:
         """Do work on all rows, in slices of them.
 
         Args:
+            name: What is done: with `model` it tells how long rows took the last time.
+            model: What it is done with.
             rows: Number of rows.
             work: Does the work on a slice of the rows; what it raises ends the batch.
 
@@ -58,16 +66,20 @@ class Batches:
             return
         await self._wait_for_turn(24 * rows)
         try:
-            count, begin = FIRST_ROWS, 0
+            counts = self._counts.setdefault(model, {})
+            count, begin = counts.get(name, FIRST_ROWS), 0
             while begin < rows:
-                end = min(rows, begin + count)
+                # Slices of about the same length: a short one would cost as many calls as others.
+                rest = rows - begin
+                end = begin + ceil(rest / ceil(rest / count))
                 start = time.perf_counter()
                 work(slice(begin, end))
                 elapsed = time.perf_counter() - start
+                # At most twice as many as before: one fast slice tells little of the next.
+                fits = int((end - begin) * SLICE / max(elapsed, 1e-6))
+                counts[name] = count = max(64, min(2 * count, fits))
                 begin = end
                 if begin < rows:
-                    # At most twice as many as before: one fast slice tells little of the next.
-                    count = max(64, min(2 * count, int(count * SLICE / max(elapsed, 1e-6))))
                     await self._endpoints.give_way()
         finally:
             self._running = bool(self._queue)
