@@ -44,8 +44,13 @@ ALIKE = 4.0
 CREDIBLE = 12.0
 # Tests of the residuals: so many deviations are too many, from so many samples on.
 MOST_DEVIATIONS, LEAST_TESTED = 4.0, 8
+# A misfit is smooth, noise is not: the sum of squares of so many slow waves of the residuals,
+# which noise makes larger than this once in a hundred thousand times, and larger than what is
+# doubtful once in a hundred. What a family could follow itself is no part of them; this share of a
+# wave keeps what is left of it apart from rounding.
+SLOW_WAVES, MOST_SLOW, DOUBTFUL, LEAST_LEFT = 4, 28.5, 13.3, 0.02
 # Deviations in a bound, and the last samples that a bound is not below if nothing fits.
-BOUND_DEVIATIONS, LAST_SAMPLES = 3.5, 20
+BOUND_DEVIATIONS, LAST_SAMPLES = 4.0, 20
 # Residuals before a sample that show whether it stands alone.
 NEIGHBOURS = 5
 
@@ -63,6 +68,8 @@ class EstimationOptions:
             was learnt before them is dropped.
         span_factor: Where the model itself does not fit, bounds are stated up to so many times the
             time that was seen, at least 1.
+        model_error: Largest error of the model itself, in the unit of x, by which all samples may
+            be off alike.
 
     Raises:
         RangeError: A number is outside its range.
@@ -73,6 +80,7 @@ class EstimationOptions:
     gate: float = 5.0
     change_after: int = 10
     span_factor: float = 3.0
+    model_error: float = 0.0
 
     def __post_init__(self) -> None:
         """Check the ranges."""
@@ -84,6 +92,8 @@ class EstimationOptions:
             raise RangeError(f"change_after must be at least 1, got {self.change_after}")
         if not self.span_factor >= 1.0:
             raise RangeError(f"span_factor must be at least 1, got {self.span_factor}")
+        if not 0.0 <= self.model_error < math.inf:
+            raise RangeError(f"model_error must be finite and at least 0, got {self.model_error}")
 
 
 @dataclass(frozen=True)
@@ -115,14 +125,17 @@ class Verdict:
 class _Fit:
     """One family's numbers, and what they leave of the samples."""
 
-    def __init__(self, family: Family) -> None:
+    def __init__(self, family: Family, systematic: float) -> None:
         self.family = family
+        # How many deviations all residuals may be off alike.
+        self.systematic = systematic
         self.numbers = family.mean
         self.root = np.diag(1.0 / family.spread)
         self.evidence = 0.0
         self.chi2 = 0.0
         self.freedom = 1
         self.linked = 0.0
+        self.slow = 0.0
         self.samples = 0
 
     def update(self, times: Floats, values: Floats, deviations: Floats, steps: int) -> None:
@@ -147,13 +160,15 @@ class _Fit:
             rows = np.concatenate([slopes / deviations[:, np.newaxis], np.diag(prior)])
             information = rows.T @ rows
             self.numbers, objective = numbers, total
-            self._judge(information, errors, away, prior)
+            self._judge(information, errors, away, prior, rows[: len(times)])
             step = np.linalg.solve(information, rows.T @ np.concatenate([errors, away]))
             numbers = family.bounded(numbers + step)
             if float(np.abs(step * prior).max()) < 1e-6:
                 break
 
-    def _judge(self, information: Floats, errors: Floats, away: Floats, prior: Floats) -> None:
+    def _judge(
+        self, information: Floats, errors: Floats, away: Floats, prior: Floats, slopes: Floats
+    ) -> None:
         self.root = np.linalg.cholesky(information).T
         self.chi2 = float(errors @ errors)
         self.freedom = max(1, len(errors) - len(prior))
@@ -161,6 +176,17 @@ class _Fit:
         occam = 2.0 * float(np.log(np.diag(self.root)).sum() - np.log(prior).sum())
         self.evidence = self.chi2 + float(away @ away) + occam
         self.samples = len(errors)
+        self.slow = self._slow(errors, slopes)
+
+    def _slow(self, errors: Floats, slopes: Floats) -> float:
+        """Return the sum of squares of the residuals' slow waves, in units of what noise makes."""
+        count = len(errors)
+        turns = np.multiply.outer(np.arange(count) + 0.5, np.arange(1, SLOW_WAVES + 1)) / count
+        waves = math.sqrt(2.0 / count) * np.cos(np.pi * turns)
+        followed = np.linalg.solve(self.root.T, slopes.T @ waves)
+        left = (1.0 + LEAST_LEFT) * np.eye(SLOW_WAVES) - followed.T @ followed
+        sizes = waves.T @ errors
+        return float(sizes @ np.linalg.solve(left, sizes))
 
     @property
     def excess(self) -> float:
@@ -174,7 +200,19 @@ class _Fit:
         """Whether the residuals are what noise would be."""
         if self.samples < LEAST_TESTED:
             return True
-        return self.excess <= MOST_DEVIATIONS and self.linked <= MOST_DEVIATIONS
+        return self.excess <= MOST_DEVIATIONS and not self.is_smooth()
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether noise would hardly make such residuals, though it might."""
+        return self.samples >= LEAST_TESTED and self.is_smooth(most=DOUBTFUL)
+
+    def is_smooth(self, noise: float = 1.0, most: float = MOST_SLOW) -> bool:
+        """Tell whether residuals hang together as no noise of so many times the stated does."""
+        alike = math.sqrt(self.samples) * self.systematic
+        most_slow = (math.sqrt(most) * noise + alike) ** 2
+        most_linked = MOST_DEVIATIONS * noise**2 + alike * self.systematic
+        return self.slow > most_slow or self.linked > most_linked
 
     def at(self, times: Floats) -> tuple[Floats, Floats]:
         """Return the response and its standard deviation at times, each shape (n,)."""
@@ -302,8 +340,8 @@ class ResponseEstimator:
     def bounds(self, times: Floats) -> Floats:
         """Return what the response is expected to differ from `learnt` by at most, shape (n,).
 
-        3.5 standard deviations of the mixture of all families, and the distance to each that
-        is credible; where nothing fits, at least the largest of the last samples.
+        Four standard deviations of the mixture of all families, and the distance to each that
+        is credible; where nothing fits, or hardly, at least the largest of the last samples.
         """
         centre = self.learnt(times)
         fits = [fit for fit in self._fits if fit.samples == self._best.samples] or [self._best]
@@ -320,7 +358,7 @@ class ResponseEstimator:
         for fit, (values, spread) in zip(fits, results, strict=True):
             if fit.evidence - least <= CREDIBLE and fit.passes:
                 bounds = np.maximum(bounds, np.abs(values - centre) + spread)
-        if self._reason(self._best):
+        if self._reason(self._best) or self._best.is_doubtful:
             last = float(np.abs(self._values[-LAST_SAMPLES:]).max())
             bounds = np.maximum(bounds, last + BOUND_DEVIATIONS * self._options.noise)
         return bounds
@@ -330,8 +368,8 @@ class ResponseEstimator:
             return "the response has changed, and what was learnt before no longer holds"
         if best.passes:
             return ""
-        # Larger noise alone leaves neighbouring residuals as independent as before.
-        if best.linked * best.samples > MOST_DEVIATIONS * best.chi2:
+        # Larger noise alone leaves residuals as independent as before.
+        if best.is_smooth(max(1.0, math.sqrt(best.chi2 / best.samples))):
             return "no family of responses near the model follows the measurements"
         return "the measurements are noisier than is stated"
 
@@ -342,7 +380,8 @@ class ResponseEstimator:
         return float(np.linalg.norm(np.linalg.solve(fit.root.T, unit)))
 
     def _restart(self) -> None:
-        self._fits = [_Fit(family(self._model)) for family in FAMILIES]
+        systematic = self._options.model_error / self._options.noise
+        self._fits = [_Fit(family(self._model), systematic) for family in FAMILIES]
         self._best = self._fits[0]
         self._times, self._values = np.zeros(0), np.zeros(0)
         self._ages = np.zeros(0)

@@ -49,8 +49,8 @@ ROBUST_ROUNDS = 3
 MORE_MISFIT = 1.3
 # Numbers that a real rate, a pair and a constant count in BIC.
 REAL_PENALTY, PAIR_PENALTY, OFFSET_PENALTY = 2, 6, 1
-# What the logarithm of the number of frequencies up to a pair's counts beside a sum of squares.
-SEARCHED = 3.0
+# What the logarithm of the number of frequencies up to a pair's counts in the sum of squares [2].
+SEARCHED = 5.0
 MOST_AUTOMATIC = 15
 # The path ends when so many numbers of terms in a row brought no lower BIC.
 PATIENCE = 4
@@ -196,8 +196,8 @@ class _Path:
     def _criterion(self, point: Projection) -> float:
         """Compare fits with as many terms: the noise is followed by the best of many frequencies.
 
-        Among k independent ones the best lowers the sum of squares by about 2 log k, and its
-        damping is searched for too.
+        Among k independent ones the best lowers the sum of squares by 2 log k in the mean; finer
+        frequencies and dampings, which are searched for too, let it exceed 3 log k now and then.
         """
         periods = point.rates.imag * self.problem.samples.end / (2.0 * np.pi)
         return point.cost + SEARCHED * float(np.log1p(periods).sum())

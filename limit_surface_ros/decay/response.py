@@ -75,7 +75,7 @@ class Response:
         self._stated = stated or (lambda times: np.full(times.shape, max_error))
         # A sample departs from any sum of these exponentials by noise and by the fit's error.
         noise = math.hypot(options.noise * abs(self.start), max_error)
-        self._options = replace(options, noise=noise)
+        self._options = replace(options, noise=noise, model_error=max_error)
         self.forget()
 
     @property
@@ -124,7 +124,7 @@ class Response:
     def bounds(self, times: ArrayLike) -> Floats:
         """Return the largest error that is to be expected at given times, in the unit of x.
 
-        What is stated of the model, and after corrections 3.5 standard deviations of the
+        What is stated of the model, and after corrections four standard deviations of the
         estimate, and the distance to other families that measurements do not rule out. Infinite
         where nothing is known: where nothing is stated, and where the model itself does not fit,
         after `span_factor` times the time that was seen.

@@ -9,6 +9,8 @@ Marquardt. All rows are in units of the noise:
 - times after the record, where the sum may not leave [-envelope, envelope]: each is drawn to the
   nearer end of that interval if it is outside;
 - each coefficient, held weakly: rates that nearly coincide then need no coefficients that cancel.
+  It is held the more the fewer samples a term lives on: terms that die away within a step could
+  follow the noise of the first samples, and would cancel there and not between them.
 
 [1] G. H. Golub, V. Pereyra, The differentiation of pseudo-inverses and nonlinear least squares
     problems whose variables separate, SIAM J. Numer. Anal. 10, 413-432, 1973,
@@ -34,10 +36,13 @@ if TYPE_CHECKING:
 # Times after the record, in parts of its end, and the rows' weight in parts of 1 / envelope.
 TAIL_TIMES = np.geomspace(1.004, 5.0, 24)
 TAIL_WEIGHT = 4.0
-# A coefficient of so many times the largest sample counts as much as one deviation of noise.
-LARGE_COEFFICIENT = 30.0
+# A coefficient of so many times the largest sample counts as much as one deviation of noise; of a
+# term that dies away within a step, one of this part of it does.
+LARGE_COEFFICIENT, SHORT_LIVED = 30.0, 1.0 / 3.0
 # Decays are kept between so many over the record, and so many over the shortest step.
 LEAST_DECAYS, MOST_DECAYS = 0.4, 3.0
+# Samples whose median step is the first.
+FIRST_STEPS = 5
 MOST_CHANGE = 1.5
 # The search ends with a step that lowers the sum of squares by less than this part.
 LEAST_GAIN = 1e-7
@@ -112,8 +117,9 @@ class VariableProjection:
         self._tail = TAIL_TIMES * samples.end
         self._allowed = TAIL_WEIGHT * samples.misfit
         self._tail_weight = self._allowed / samples.envelope
-        self._ridge = 1.0 / (LARGE_COEFFICIENT * float(np.abs(samples.values).max()))
         steps = np.diff(samples.times)
+        self._largest = float(np.abs(samples.values).max())
+        self._first_step = float(np.median(steps[:FIRST_STEPS]))
         self._decays = samples.least_decays / samples.end, MOST_DECAYS / float(steps.min())
         self._highest = np.pi / float(np.median(steps))
 
@@ -133,7 +139,7 @@ class VariableProjection:
             rows[:count, terms] = self._row_weights
         tail = real_basis(rates, self._tail) * self._tail_weight
         rows[count : count + len(tail), :terms] = tail
-        rows[count + len(tail) :, :terms] = self._ridge * np.eye(terms)
+        rows[count + len(tail) :, :terms] = np.diag(self._ridge(rates))
         basis, triangle, order = linalg.qr(rows, mode="economic", pivoting=True)
         sizes = np.abs(np.diag(triangle))
         rank = int(np.count_nonzero(sizes > RANK_TOLERANCE * sizes[0]))
@@ -149,6 +155,12 @@ class VariableProjection:
         solution = np.zeros(columns)
         solution[order[:rank]] = linalg.solve_triangular(triangle[:rank, :rank], projected)
         return Projection(rates, solution, basis, target - basis @ projected)
+
+    def _ridge(self, rates: Complexes) -> Floats:
+        """Return the weights of the coefficients' own rows, shape (terms,)."""
+        columns = np.where(rates.imag == 0.0, 1, 2)
+        shares = np.minimum(-rates.real * self._first_step, 1.0) / SHORT_LIVED
+        return (1.0 / LARGE_COEFFICIENT + np.repeat(shares, columns)) / self._largest
 
     def improve(self, start: Projection, steps: int) -> Projection:
         """Move the rates to lower the sum of squares, by at most so many steps."""

@@ -55,8 +55,8 @@ EXAMPLES = """methods:
             polished
 
 After the interval the response is assumed to stay within its largest value over the last tenth of
-it. Every fit is held to that there, or to its error if that is larger, and what it provably never
-exceeds is printed and written beside the assumption.
+it, or over its last swing. Every fit is held to that there, or to its error if that is larger, and
+what it provably never exceeds is printed and written beside the assumption.
 
 Records: a fit is made on the samples and its error measured there; only how far the sum departs
 from lines between samples beyond the record's own curvature is counted too. Methods that need a

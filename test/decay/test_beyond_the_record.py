@@ -98,6 +98,28 @@ def test_the_envelope_is_the_largest_value_of_the_last_tenth_but_for_outliers():
     assert envelope_of(Record(times, values), 10.0) == pytest.approx(np.exp(-0.9))
 
 
+@pytest.mark.parametrize("end", np.linspace(2.5, 9.5, 15))
+def test_a_swing_that_crosses_zero_where_the_record_ends_is_expected_to_go_on(end):
+    def swing(t):
+        return np.exp(-0.15 * t) * np.cos(2.0 * t + 0.4)
+
+    later = float(np.abs(swing(np.linspace(end, 4.0 * end, 20_001))).max())
+    assert later <= envelope_of(record(swing, end, 0.01), end, 0.01) <= 2.0 * later + 0.05
+
+
+def test_an_undershoot_that_has_died_away_is_no_swing():
+    times = np.linspace(0.0, 6.0, 601)
+    undershoot = Record(times, np.exp(-times) * (1.0 - 1.5 * times))
+    assert envelope_of(undershoot, 6.0) == pytest.approx(abs(undershoot.values[540]))
+
+
+def test_slow_terms_that_cancel_on_the_record_are_held_for_as_long_as_they_last():
+    line = record(lambda t: 1.0 - t / 7.0, 6.0, samples=300)
+    fit = fit_decay(line, 9, 6.0)
+    assert fit.fit.max_error < 1e-4
+    assert fit.tail.bound < 2.0 * fit.tail.envelope
+
+
 def test_a_model_states_its_bounds_where_something_is_known():
     fit = fit_decay(record(kinky, 6.0), 5, 6.0)
     model = DecayModel("k", fit.fit.sum, (0.0, 6.0), "inf", fit.fit.max_error, tail=fit.tail)

@@ -103,6 +103,23 @@ def test_a_response_of_no_family_is_told_and_its_bound_is_wide(seed):
     assert share_of_bound(estimator, gaussian) <= 1.0
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_a_straight_line_is_told_from_an_exponential_before_it_ends(seed):
+    def line(t):
+        return np.maximum(1.0 - np.asarray(t) / 2.5, 0.0)
+
+    assert share_of_bound(seen(ONE, line, seed), line) <= 1.0
+
+
+def test_what_the_model_itself_may_be_off_is_no_misfit():
+    options = EstimationOptions(noise=0.02, model_error=0.02)
+    wavy = seen(TWO, lambda t: TWO(t) + 0.02 * np.sin(7.0 * np.asarray(t)), options=options)
+    assert wavy.verdict.fits
+    blind = EstimationOptions(noise=0.01)
+    wavy = seen(TWO, lambda t: TWO(t) + 0.02 * np.sin(7.0 * np.asarray(t)), options=blind)
+    assert not wavy.verdict.fits
+
+
 def test_noise_that_is_larger_than_stated_is_told_as_such():
     verdict = seen(ONE, ONE, options=EstimationOptions(noise=NOISE / 4.0, gate=50.0)).verdict
     assert not verdict.fits

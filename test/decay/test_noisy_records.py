@@ -57,6 +57,29 @@ def test_a_steep_start_is_no_outlier():
     assert len(fit.outliers) == 0
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_terms_that_die_within_a_step_do_not_follow_the_first_samples(seed):
+    def held(t):
+        return 8.0 * np.clip((3.5 - t) / 0.5, 0.0, 1.0)
+
+    noisy = record(held, samples=300, noise=0.4, seed=seed)
+    fit = fit_decay(noisy, 15, 6.0)
+    start = np.linspace(0.0, 0.1, 1001)
+    assert np.abs(fit.fit.sum(start) - 8.0).max() < 4.0 * fit.noise
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_more_terms_than_a_response_has_do_not_follow_noise_at_any_frequency(seed):
+    rates, weights = np.array([-0.5, -3.0, -20.0]), np.array([0.4, 0.4, 0.2])
+
+    def real(t):
+        return np.exp(np.multiply.outer(t, rates)) @ weights
+
+    fit = fit_decay(record(real, samples=2000, noise=0.01, seed=seed), 7, 6.0)
+    assert not fit.fit.sum.rates.imag.any()
+    assert rms(fit, real) < 0.01 * np.sqrt(14.0 / 2000.0)
+
+
 def test_a_clean_sum_is_met_to_rounding_and_not_by_least_squares():
     rates, coefficients = [-0.4, -1.1, -3.0, -9.0, -25.0], [0.25, 0.3, 0.2, 0.15, 0.1]
     clean = record(lambda t: np.exp(np.multiply.outer(t, rates)) @ coefficients)
