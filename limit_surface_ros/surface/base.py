@@ -6,13 +6,14 @@ point and in its frame. Twists are (vx, vy, omega_z) in [m/s, m/s, rad/s] of the
 point. Their dot product is power.
 
 A surface is a shape and a scaling. The shape has the three maps on scaled columns, arrays (3, m)
-of numbers of size about one. The base takes what callers pass, of shape (..., 3) in physical
-units, to such columns in blocks that fit the processor's cache, and back.
+of numbers of size about one. What callers pass, of shape (..., 3) in physical units, goes to such
+columns and back in blocks that fit the processor's cache (`surface.scaling`). The derivatives of
+the maps are in `surface.derivatives`.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass, fields
 from functools import cache, cached_property
 from math import inf, sqrt
@@ -20,22 +21,16 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
-from limit_surface_ros.checks import (
-    as_directions,
-    as_positive,
-    as_rows,
-    as_vectors,
-    one_direction,
-)
-from limit_surface_ros.runtime import keep_scratch
-from limit_surface_ros.surface.scaling import Scaling
+from limit_surface_ros.checks import as_positive, as_rows, one_direction
+from limit_surface_ros.surface.derivatives import Derivatives
+from limit_surface_ros.surface.scaling import Scaling, write_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Mapping
 
     from numpy.typing import ArrayLike
 
-    from limit_surface_ros.checks import Bools, Floats
+    from limit_surface_ros.checks import Floats
     from limit_surface_ros.surface.gauges.gauge import Vector
     from limit_surface_ros.surface.shape import Shape
 
@@ -66,7 +61,7 @@ def _field_names(kind: type[LimitSurface]) -> tuple[str, ...]:
     return tuple(each.name for each in fields(kind))
 
 
-class LimitSurface(ABC):
+class LimitSurface(Derivatives):
     """The boundary of the convex set of wrenches that dry friction can resist.
 
     A kind is a frozen dataclass whose fields are its `arrays` and `scaling`; what it says of
@@ -83,7 +78,6 @@ class LimitSurface(ABC):
     kind: ClassVar[str]
     arrays: ClassVar[tuple[FileArray, ...]] = ()
     wrench_is_closed: ClassVar[bool] = False
-    scaling: Scaling
     # Every kind is a dataclass.
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
@@ -278,7 +272,7 @@ class LimitSurface(ABC):
         for block, columns, sizes in self._blocks("wrench", array, self.scaling.wrench_unit):
             motions, scaled_factors = self.shape.motions_and_load_factors(columns)
             np.multiply(scaled_factors, sizes, out=factors[block])
-            _write(motions, self.scaling.twist_unit, twists[block])
+            write_rows(motions, self.scaling.twist_unit, twists[block])
         return twists.reshape(array.shape), factors.reshape(array.shape[:-1])[()]
 
     def wrench_of_twist(self, twist: ArrayLike) -> Floats:
@@ -308,33 +302,6 @@ class LimitSurface(ABC):
         unit_in, unit_out = self.scaling.twist_unit, self.scaling.wrench_unit
         return self._mapped("twist", twist, unit_in, self.shape.loads, unit_out)
 
-    def twist_jacobian(self, wrench: ArrayLike) -> tuple[Floats, Floats]:
-        """Direction of the incipient motion, and its derivative by the wrench.
-
-        Args:
-            wrench: Shape (..., 3), (fx, fy, tau_z) in [N, N, N m], not zero.
-
-        Returns:
-            Twists as `twist_of_wrench` gives them, shape (..., 3), and Jacobians, shape
-            (..., 3, 3), row i and column j the derivative of component i by wrench component j.
-            Within a facet they are zero; at a kink those of what is smooth there.
-
-        Raises:
-            ShapeError: The last axis does not hold three components.
-            NotFiniteError: A component is NaN or infinite.
-            ZeroVectorError: A wrench is zero.
-            DataError: The kind has no derivatives in closed form.
-
-        Example:
-            >>> import numpy as np
-            >>> from limit_surface_ros.surface import PowerSum
-            >>> twist, jacobian = PowerSum([np.eye(3)], [1.0]).twist_jacobian([2.0, 0.0, 0.0])
-            >>> jacobian.round(12).tolist()
-            [[0.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.5]]
-        """
-        _, twists, jacobians = self._twist_derivatives(wrench)
-        return twists, jacobians
-
     def load_factor_gradient(self, wrench: ArrayLike) -> Floats:
         """Derivative of the load factor by the wrench.
 
@@ -354,95 +321,6 @@ class LimitSurface(ABC):
         power = (twists * array).sum(axis=-1)
         return np.asarray(twists * (factors / power)[..., np.newaxis])
 
-    def quadratic_twist(self, wrench: ArrayLike) -> tuple[Floats, Floats]:
-        """Load factor times its gradient, and the derivative of that by the wrench.
-
-        It is homogeneous of degree one. For an ellipsoid w'L w = 1 it is L w, as pusher-slider
-        models write the motion of a body; for any other surface it is what stands in its place,
-        and the inverse of D(v) times the load of maximum dissipation.
-
-        Args:
-            wrench: Shape (..., 3), (fx, fy, tau_z) in [N, N, N m], not zero.
-
-        Returns:
-            Twists, shape (..., 3), and symmetric Jacobians K with K w = the twist,
-            shape (..., 3, 3).
-
-        Raises:
-            ShapeError: The last axis does not hold three components.
-            NotFiniteError: A component is NaN or infinite.
-            ZeroVectorError: A wrench is zero.
-            DataError: The kind has no derivatives in closed form.
-        """
-        array = as_rows("wrench", wrench)
-        factors, twists, jacobians = self._twist_derivatives(array)
-        power = (twists * array).sum(axis=-1)
-        gradients = twists * (factors / power)[..., np.newaxis]
-        # g Hess g: what the unit twist's derivative is across it, made symmetric by Euler's
-        # theorem, Hess g w = 0.
-        unit = self.scaling.twist_unit
-        length = np.sqrt((np.square(gradients / unit)).sum(axis=-1))
-        across = jacobians * length[..., np.newaxis, np.newaxis]
-        # What is missing along the twist follows from w' Hess g = 0.
-        missing = np.einsum("...i,...ij->...j", array, across) / power[..., np.newaxis]
-        hessians = across - twists[..., :, np.newaxis] * missing[..., np.newaxis, :]
-        k = gradients[..., :, np.newaxis] * gradients[..., np.newaxis, :]
-        k += factors[..., np.newaxis, np.newaxis] * hessians
-        return gradients * factors[..., np.newaxis], 0.5 * (k + np.swapaxes(k, -1, -2))
-
-    def wrench_jacobian(self, twist: ArrayLike) -> tuple[Floats, Floats]:
-        """Load of maximum dissipation, and its derivative by the twist.
-
-        Args:
-            twist: Shape (..., 3), (vx, vy, omega_z) in [m/s, m/s, rad/s], not zero.
-
-        Returns:
-            Wrenches as `wrench_of_twist` gives them, shape (..., 3), and symmetric Jacobians,
-            shape (..., 3, 3), which take the twist itself to zero.
-
-        Raises:
-            ShapeError: The last axis does not hold three components.
-            NotFiniteError: A component is NaN or infinite.
-            ZeroVectorError: A twist is zero.
-            DataError: The kind has no derivatives in closed form.
-        """
-        array = as_rows("twist", twist)
-        unit_in, unit_out = self.scaling.twist_unit, self.scaling.wrench_unit
-        count = array.size // 3
-        wrenches, jacobians = np.empty((count, 3)), np.empty((count, 3, 3))
-        for block, columns, sizes in self._blocks("twist", array, unit_in):
-            loads, derivatives, _ = self.shape.load_jacobians(columns)
-            _write(loads, unit_out, wrenches[block])
-            _write_jacobians(derivatives, unit_out, unit_in, sizes, jacobians[block])
-        return wrenches.reshape(array.shape), jacobians.reshape(*array.shape, 3)
-
-    def is_smooth_at(self, wrench: ArrayLike) -> Bools:
-        """Whether `twist_of_wrench` has a derivative at wrenches (..., 3); shape (...)."""
-        array = as_rows("wrench", wrench)
-        smooth = np.empty(array.size // 3, dtype=bool)
-        for block, columns, _ in self._blocks("wrench", array, self.scaling.wrench_unit):
-            smooth[block] = self.shape.motion_jacobians(columns)[3]
-        return smooth.reshape(array.shape[:-1])
-
-    def _twist_derivatives(self, wrench: ArrayLike) -> tuple[Floats, Floats, Floats]:
-        """Return load factors (...), twists (..., 3) and their Jacobians (..., 3, 3)."""
-        array = as_rows("wrench", wrench)
-        unit_in, unit_out = self.scaling.wrench_unit, self.scaling.twist_unit
-        count = array.size // 3
-        factors, twists = np.empty(count), np.empty((count, 3))
-        jacobians = np.empty((count, 3, 3))
-        for block, columns, sizes in self._blocks("wrench", array, unit_in):
-            found, motions, derivatives, _ = self.shape.motion_jacobians(columns)
-            np.multiply(found, sizes, out=factors[block])
-            _write(motions, unit_out, twists[block])
-            _write_jacobians(derivatives, unit_out, unit_in, sizes, jacobians[block])
-        shape = array.shape[:-1]
-        return (
-            factors.reshape(shape)[()],
-            twists.reshape(array.shape),
-            jacobians.reshape(*shape, 3, 3),
-        )
-
     def _one_load(self, wrench: Any) -> Vector | None:
         """Return a single, plainly valid wrench in scaled variables, None for anything else."""
         one = one_direction(wrench)
@@ -460,57 +338,3 @@ class LimitSurface(ABC):
         return np.array(
             (x / length, y / length, z / (length * self.scaling.characteristic_length))
         )
-
-    def _mapped(
-        self,
-        name: str,
-        vectors: ArrayLike,
-        unit_in: Floats,
-        kernel: Callable[[Floats], Floats],
-        unit_out: Floats,
-    ) -> Floats:
-        """Map vectors (..., 3) through a kernel on scaled columns."""
-        array = as_rows(name, vectors)
-        result = np.empty((array.size // 3, 3))
-        for block, columns, _ in self._blocks(name, array, unit_in):
-            _write(kernel(columns), unit_out, result[block])
-        return result.reshape(array.shape)
-
-    def _blocks(
-        self, name: str, array: Floats, unit: Floats, *, zeros: bool = False
-    ) -> Iterator[tuple[slice, Floats, Floats]]:
-        """Yield blocks of vectors (..., 3): a slice, scaled columns of size one, and their sizes.
-
-        The size is taken out first, so that no load overflows or vanishes on the way. It also
-        tells, for less than a look at each number costs, whether all is well with a vector.
-        """
-        rows = array.reshape(-1, 3)
-        self.shape.expect(len(rows))
-        count = self.shape.columns_at_once
-        keep_scratch(len(rows))
-        for start in range(0, len(rows), count):
-            block = slice(start, start + count)
-            columns = rows[block].T.copy()
-            sizes = np.maximum.reduce(np.abs(columns))
-            # NaN fails the comparison.
-            if np.count_nonzero(sizes) < len(sizes) or not np.maximum.reduce(sizes) < np.inf:
-                (as_vectors if zeros else as_directions)(name, array)
-                sizes[sizes == 0.0] = 1.0
-            columns /= sizes
-            columns /= unit[:, np.newaxis]
-            yield block, columns, sizes
-
-
-def _write(columns: Floats, unit: Floats, rows: Floats) -> None:
-    """Write scaled columns (3, m) into rows (m, 3), in physical units."""
-    # Along the columns: numpy is slow along rows of three.
-    np.multiply(columns, unit[:, np.newaxis], out=rows.T)
-
-
-def _write_jacobians(
-    columns: Floats, unit_out: Floats, unit_in: Floats, sizes: Floats, out: Floats
-) -> None:
-    """Write scaled Jacobians (3, 3, m) at vectors of size one into (m, 3, 3), physical units."""
-    columns *= np.multiply.outer(unit_out, 1.0 / unit_in)[:, :, np.newaxis]
-    columns /= sizes
-    out.transpose(1, 2, 0)[...] = columns

@@ -7,16 +7,23 @@ vectors and angles between motions are measured in them.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.checks import as_positive
+from limit_surface_ros.checks import as_directions, as_positive, as_rows, as_vectors
+from limit_surface_ros.runtime import keep_scratch
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from numpy.typing import ArrayLike
+
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.shape import Shape
 
 
 @dataclass(frozen=True)
@@ -51,3 +58,63 @@ class Scaling:
     def twist_unit(self) -> Floats:
         """(1, 1, 1 / rho) in [m/s, m/s, rad/s], shape (3,)."""
         return np.array([1.0, 1.0, 1.0 / self.characteristic_length])
+
+
+class InScaledVariables(ABC):
+    """A shape and its scaling: vectors in physical units go to the shape and back in blocks.
+
+    Attributes:
+        scaling: Characteristic length [m] and friction force [N].
+    """
+
+    scaling: Scaling
+
+    @cached_property
+    @abstractmethod
+    def shape(self) -> Shape:
+        """The surface in scaled variables."""
+
+    def _mapped(
+        self,
+        name: str,
+        vectors: ArrayLike,
+        unit_in: Floats,
+        kernel: Callable[[Floats], Floats],
+        unit_out: Floats,
+    ) -> Floats:
+        """Map vectors (..., 3) through a kernel on scaled columns."""
+        array = as_rows(name, vectors)
+        result = np.empty((array.size // 3, 3))
+        for block, columns, _ in self._blocks(name, array, unit_in):
+            write_rows(kernel(columns), unit_out, result[block])
+        return result.reshape(array.shape)
+
+    def _blocks(
+        self, name: str, array: Floats, unit: Floats, *, zeros: bool = False
+    ) -> Iterator[tuple[slice, Floats, Floats]]:
+        """Yield blocks of vectors (..., 3): a slice, scaled columns of size one, and their sizes.
+
+        The size is taken out first, so that no load overflows or vanishes on the way. It also
+        tells, for less than a look at each number costs, whether all is well with a vector.
+        """
+        rows = array.reshape(-1, 3)
+        self.shape.expect(len(rows))
+        count = self.shape.columns_at_once
+        keep_scratch(len(rows))
+        for start in range(0, len(rows), count):
+            block = slice(start, start + count)
+            columns = rows[block].T.copy()
+            sizes = np.maximum.reduce(np.abs(columns))
+            # NaN fails the comparison.
+            if np.count_nonzero(sizes) < len(sizes) or not np.maximum.reduce(sizes) < np.inf:
+                (as_vectors if zeros else as_directions)(name, array)
+                sizes[sizes == 0.0] = 1.0
+            columns /= sizes
+            columns /= unit[:, np.newaxis]
+            yield block, columns, sizes
+
+
+def write_rows(columns: Floats, unit: Floats, rows: Floats) -> None:
+    """Write scaled columns (3, m) into rows (m, 3), in physical units."""
+    # Along the columns: numpy is slow along rows of three.
+    np.multiply(columns, unit[:, np.newaxis], out=rows.T)

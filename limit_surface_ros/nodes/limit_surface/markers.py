@@ -17,7 +17,7 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from limit_surface_ros.surface.mesh import mesh_of
+from limit_surface_ros.export.mesh import mesh_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

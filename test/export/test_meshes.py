@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The promise of `surface.mesh`: closed, on the surface, and the right way round."""
+"""The promise of `export.mesh`: closed, on the surface, and the right way round."""
 
 from collections import Counter
 
@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from limit_surface_ros.errors import RangeError
+from limit_surface_ros.export.mesh import mesh_of
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
-from limit_surface_ros.surface.mesh import mesh_of
 from limit_surface_ros.surface.scaling import Scaling
 
 BALL = PowerSum.norms([np.eye(3)], Scaling(0.1, 4.0))
