@@ -22,8 +22,9 @@ from limit_surface_ros.motion.sliding.batch import slides
 from limit_surface_ros.motion.sliding.body import SlidingBody
 from limit_surface_ros.motion.sliding.inertia import Inertia
 from limit_surface_ros.motion.sliding.load import Load
-from limit_surface_ros.motion.sliding.slide import slide, slide_body
+from limit_surface_ros.motion.sliding.slide import slide, slide_stages
 from limit_surface_ros.motion.slip import predict_slip, required_share
+from limit_surface_ros.motion.stages import finish
 from limit_surface_ros.surface.base import LimitSurface
 from limit_surface_ros.surface.contact import shapes
 from limit_surface_ros.surface.contact.patch import ContactPatch
@@ -153,8 +154,8 @@ def loaded_slides(surface: LimitSurface, count: int) -> None:
                 wrench = rng.normal(size=3) * [1.0, 1.0, RHO]
                 wrench *= rng.uniform(1.1, 6.0) / surface.load_factor(wrench)
                 load = Load(wrench, x, in_world)
-                spent, found = timed(lambda: slide_body(body, AT_REST, load))  # noqa: B023
-                exact = slide_body(body, AT_REST, load, tolerance=1e-11)
+                spent, found = timed(lambda: finish(slide_stages(body, AT_REST, load)))  # noqa: B023
+                exact = finish(slide_stages(body, AT_REST, load, tolerance=1e-11))
                 times.append(spent)
                 errors.append(abs(found.time / exact.time - 1.0))
             rows.append(
@@ -184,12 +185,12 @@ def batches(surfaces: dict[str, LimitSurface]) -> None:
         body = SlidingBody(surface, inertia)
         ways = {
             "batch": lambda: slides(surface, inertia, twists),  # noqa: B023
-            "alone": lambda: [slide_body(body, twist) for twist in few],  # noqa: B023
+            "alone": lambda: [finish(slide_stages(body, twist)) for twist in few],  # noqa: B023
         }
         spent = interleaved(ways, rounds=5)
         together = slides(surface, inertia, twists)
         worst = max(
-            abs(slide_body(body, twist).time / stop - 1.0)
+            abs(finish(slide_stages(body, twist)).time / stop - 1.0)
             for twist, stop in zip(few, together.times[:50], strict=True)
         )
         ratio = spent["alone"] / len(few) / (spent["batch"] / len(twists))

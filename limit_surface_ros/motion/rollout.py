@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from limit_surface_ros.motion.inward_corner import Scene
 from limit_surface_ros.motion.outcomes import MODES, PushRun, PushRuns
 from limit_surface_ros.motion.push_checks import as_vectors_of, friction_edges
 from limit_surface_ros.motion.rollout_steps import Rollout
+from limit_surface_ros.motion.stages import finish
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator
@@ -28,13 +29,10 @@ __all__ = [
     "OVERLAPS",
     "PushRun",
     "PushRuns",
-    "push_run_steps",
-    "push_steps",
+    "Pushing",
     "simulate_push",
     "simulate_pushes",
 ]
-
-Found = TypeVar("Found")
 
 DEFAULT_ACCURACY = 1e-5
 # Accuracy that double precision still gives [m], and the coarsest that makes sense.
@@ -96,60 +94,8 @@ def simulate_push(
         >>> (np.round(run.end_pose, 6) + 0.0).tolist()
         [0.6, 0.0, 0.0]
     """
-    return _last(
-        push_run_steps(
-            surface,
-            outline,
-            tip_radius,
-            friction,
-            pose,
-            path,
-            accuracy=accuracy,
-            overlap=overlap,
-            reference_point=reference_point,
-        )
-    )
-
-
-def push_run_steps(
-    surface: LimitSurface,
-    outline: Outline,
-    tip_radius: float,
-    friction: float,
-    pose: ArrayLike,
-    path: ArrayLike,
-    *,
-    accuracy: float = DEFAULT_ACCURACY,
-    overlap: str = "keep",
-    reference_point: ArrayLike = (0.0, 0.0),
-) -> Generator[None, None, PushRun]:
-    """Do as `simulate_push`, but in steps of about a millisecond; see `push_steps`."""
-    given, way = as_floats("pose", pose), as_floats("path", path)
-    if given.shape != (3,):
-        raise ShapeError(f"pose must be x, y and an angle, got shape {given.shape}")
-    if way.ndim != 2:
-        raise ShapeError(f"path must have shape (m, 2), got {way.shape}")
-    batch = _Batch(surface, outline, tip_radius, friction, accuracy, overlap, reference_point)
-    (rollout,) = batch.blocks(given[np.newaxis], way[np.newaxis], record=True)
-    yield from rollout.rounds()
-    steps = rollout.recorded
-    twists, modes, wrenches, contacts = rollout.outcomes(steps)
-    touched, left = float(rollout.touched_at[0]), float(rollout.left_at[0])
-    return PushRun(
-        rollout.poses[0],
-        steps.poses,
-        steps.lengths,
-        as_vectors_of(steps.tips),
-        _placed(steps.poses, contacts),
-        tuple(MODES[mode] for mode in modes),
-        twists,
-        wrenches,
-        None if np.isnan(touched) else touched,
-        None if np.isnan(left) else left,
-        float(rollout.errors[0]),
-        int(rollout.evaluations[0]),
-        steps.rates,
-    )
+    pushing = Pushing(surface, outline, tip_radius, friction, accuracy, overlap, reference_point)
+    return finish(pushing.along(pose, path))
 
 
 def simulate_pushes(
@@ -180,68 +126,23 @@ def simulate_pushes(
     Raises:
         ShapeError, NotFiniteError, RangeError, OutlineError, SolverError: As `simulate_push`.
     """
-    return _last(
-        push_steps(
-            surface,
-            outline,
-            tip_radius,
-            friction,
-            poses,
-            paths,
-            accuracy=accuracy,
-            overlap=overlap,
-            reference_point=reference_point,
-        )
-    )
+    pushing = Pushing(surface, outline, tip_radius, friction, accuracy, overlap, reference_point)
+    return finish(pushing.along_each(poses, paths))
 
 
-def push_steps(
-    surface: LimitSurface,
-    outline: Outline,
-    tip_radius: float,
-    friction: float,
-    poses: ArrayLike,
-    paths: ArrayLike,
-    *,
-    accuracy: float = DEFAULT_ACCURACY,
-    overlap: str = "keep",
-    reference_point: ArrayLike = (0.0, 0.0),
-) -> Generator[None, None, PushRuns]:
-    """Do as `simulate_pushes`, but in steps of a few milliseconds, for who has more to do.
+class Pushing:
+    """A body, a round tip and how exactly to follow the two, for one push or many.
 
-    Yields after each step, and returns what `simulate_pushes` does. What is wrong with the
-    arguments is told by the first step.
+    Work is in stages, between which who has more to do may do it; see `motion.stages`. What is
+    wrong with paths and poses is told by the first stage.
+
+    Args:
+        surface, outline, tip_radius, friction, accuracy, overlap, reference_point: See
+            `simulate_push`.
+
+    Raises:
+        ShapeError, NotFiniteError, RangeError: As `simulate_push`.
     """
-    given, ways = as_floats("poses", poses), as_floats("paths", paths)
-    if given.ndim != 2 or given.shape[1] != 3:
-        raise ShapeError(f"poses must have shape (n, 3), got {given.shape}")
-    if ways.ndim != 3 or len(ways) != len(given):
-        raise ShapeError(f"paths must have shape ({len(given)}, m, 2), got {ways.shape}")
-    batch = _Batch(surface, outline, tip_radius, friction, accuracy, overlap, reference_point)
-    runs = []
-    for rollout in batch.blocks(given, ways, record=False):
-        yield from rollout.rounds()
-        runs.append(rollout)
-    return PushRuns(
-        *(
-            np.concatenate([getattr(run, name) for run in runs])
-            for name in ("poses", "touched_at", "left_at", "errors", "evaluations")
-        )
-    )
-
-
-def _last(steps: Generator[None, None, Found]) -> Found:
-    """Return what a generator does in the end."""
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            found: Found = end.value
-            return found
-
-
-class _Batch:
-    """Checked settings of pushes, and the blocks in which they run."""
 
     def __init__(
         self,
@@ -249,10 +150,11 @@ class _Batch:
         outline: Outline,
         tip_radius: float,
         friction: float,
-        accuracy: float,
-        overlap: str,
-        reference_point: ArrayLike,
+        accuracy: float = DEFAULT_ACCURACY,
+        overlap: str = "keep",
+        reference_point: ArrayLike = (0.0, 0.0),
     ) -> None:
+        """Check the settings."""
         radius = float(as_floats("tip_radius", tip_radius))
         if radius < 0.0:
             raise RangeError(f"tip_radius must be 0 or above, got {radius}")
@@ -272,7 +174,53 @@ class _Batch:
         )
         self._radius, self._overlap = radius, overlap
 
-    def blocks(self, poses: Floats, paths: Floats, *, record: bool) -> Iterator[Rollout]:
+    def along(self, pose: ArrayLike, path: ArrayLike) -> Generator[None, None, PushRun]:
+        """Do as `simulate_push`, in stages of about a millisecond."""
+        given, way = as_floats("pose", pose), as_floats("path", path)
+        if given.shape != (3,):
+            raise ShapeError(f"pose must be x, y and an angle, got shape {given.shape}")
+        if way.ndim != 2:
+            raise ShapeError(f"path must have shape (m, 2), got {way.shape}")
+        (rollout,) = self._blocks(given[np.newaxis], way[np.newaxis], record=True)
+        yield from rollout.rounds()
+        steps = rollout.recorded
+        twists, modes, wrenches, contacts = rollout.outcomes(steps)
+        touched, left = float(rollout.touched_at[0]), float(rollout.left_at[0])
+        return PushRun(
+            rollout.poses[0],
+            steps.poses,
+            steps.lengths,
+            as_vectors_of(steps.tips),
+            _placed(steps.poses, contacts),
+            tuple(MODES[mode] for mode in modes),
+            twists,
+            wrenches,
+            None if np.isnan(touched) else touched,
+            None if np.isnan(left) else left,
+            float(rollout.errors[0]),
+            int(rollout.evaluations[0]),
+            steps.rates,
+        )
+
+    def along_each(self, poses: ArrayLike, paths: ArrayLike) -> Generator[None, None, PushRuns]:
+        """Do as `simulate_pushes`, in stages of a few milliseconds."""
+        given, ways = as_floats("poses", poses), as_floats("paths", paths)
+        if given.ndim != 2 or given.shape[1] != 3:
+            raise ShapeError(f"poses must have shape (n, 3), got {given.shape}")
+        if ways.ndim != 3 or len(ways) != len(given):
+            raise ShapeError(f"paths must have shape ({len(given)}, m, 2), got {ways.shape}")
+        runs = []
+        for rollout in self._blocks(given, ways, record=False):
+            yield from rollout.rounds()
+            runs.append(rollout)
+        return PushRuns(
+            *(
+                np.concatenate([getattr(run, name) for run in runs])
+                for name in ("poses", "touched_at", "left_at", "errors", "evaluations")
+            )
+        )
+
+    def _blocks(self, poses: Floats, paths: Floats, *, record: bool) -> Iterator[Rollout]:
         """Yield blocks of pushes that have not begun, at least one."""
         if paths.shape[2:] != (2,) or paths.shape[1] < 2:
             raise ShapeError(f"a path has shape (m, 2) with m at least 2, got {paths.shape[1:]}")

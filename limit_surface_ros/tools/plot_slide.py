@@ -17,7 +17,8 @@ from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.motion.sliding.body import SlidingBody
 from limit_surface_ros.motion.sliding.inertia import Inertia
 from limit_surface_ros.motion.sliding.load import Load
-from limit_surface_ros.motion.sliding.slide import slide_body, stop_bracket
+from limit_surface_ros.motion.sliding.slide import slide_stages, stop_bracket
+from limit_surface_ros.motion.stages import finish
 from limit_surface_ros.plots.canvas import save_figure
 from limit_surface_ros.plots.film import FILMS
 from limit_surface_ros.plots.slide_view import draw_slide, write_slide_film
@@ -139,7 +140,7 @@ def run(options: argparse.Namespace) -> None:
     else:
         decay = read_decay_model(options.decay)
         load = Load(options.wrench, decay.sum, options.in_world)
-    found = slide_body(body, options.twist, load, options.pose)
+    found = finish(slide_stages(body, options.twist, load, options.pose))
     print(f"body        {model.name}")
     print(f"rests       after {found.time:.6f} s")
     if load is not None:

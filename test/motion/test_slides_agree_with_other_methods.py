@@ -12,7 +12,8 @@ from limit_surface_ros.motion.sliding.equations import FreeMotion, State
 from limit_surface_ros.motion.sliding.friction import NormFriction
 from limit_surface_ros.motion.sliding.inertia import Inertia
 from limit_surface_ros.motion.sliding.load import Load
-from limit_surface_ros.motion.sliding.slide import slide, slide_body
+from limit_surface_ros.motion.sliding.slide import slide, slide_stages
+from limit_surface_ros.motion.stages import finish
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
@@ -300,7 +301,10 @@ def test_the_path_between_steps_is_that_of_fine_steps():
     for _ in range(5):
         body = SlidingBody(dissipation_surface(rng), random_inertia(rng))
         twist = random_twist(rng)
-        rough, fine = slide_body(body, twist), slide_body(body, twist, tolerance=1e-13)
+        rough, fine = (
+            finish(slide_stages(body, twist)),
+            finish(slide_stages(body, twist, tolerance=1e-13)),
+        )
         times = np.linspace(0.0, rough.time, 101)
         for one, other, size in zip(
             rough.path.at(times), fine.path.at(times), (1e-4, 1e-2), strict=True

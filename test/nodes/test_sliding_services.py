@@ -27,8 +27,9 @@ from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_mod
 from limit_surface_ros.motion.sliding.body import SlidingBody
 from limit_surface_ros.motion.sliding.inertia import Inertia
 from limit_surface_ros.motion.sliding.load import Load
-from limit_surface_ros.motion.sliding.slide import slide, slide_body, stop_bracket
+from limit_surface_ros.motion.sliding.slide import slide, slide_stages, stop_bracket
 from limit_surface_ros.motion.slip import load_factors, predict_slip, required_share
+from limit_surface_ros.motion.stages import finish
 from limit_surface_ros.nodes.decay_node import DecayNode
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
@@ -248,7 +249,9 @@ def test_a_stop_is_told_only_of_a_body_with_inertia(predict_stop):
     assert answer.has_stop_time
     body = SlidingBody(BOX.surface, Inertia(0.3, 5e-4, (0.01, 0.0)))
     load = Load(at_reference(PUSH, "wrench"), FADING)
-    assert answer.stop_time == pytest.approx(slide_body(body, (0.0, 0.0, 0.0), load).time)
+    assert answer.stop_time == pytest.approx(
+        finish(slide_stages(body, (0.0, 0.0, 0.0), load)).time
+    )
     assert answer.holds_from == without.holds_from < answer.stop_time
     assert answer.earliest_stop_time < answer.stop_time < answer.latest_stop_time
     bad = PredictStop.Request(wrench=wrench_message(PUSH), inertia=inertia_message(mass=-0.1))

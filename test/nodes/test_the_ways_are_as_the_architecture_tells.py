@@ -147,6 +147,7 @@ def test_the_way_of_a_batch_of_twists(ros, surface_file):
         TwistsToWrenches.Request(twists=twists.ravel().tolist()),
         model_files=[str(surface_file)],
         diagnostics_period=60.0,
+        marker_rate=0.1,
     )
     check("A batch of twists", modules)
 

@@ -25,7 +25,8 @@ from limit_surface_ros.motion.sliding.dormand_prince import (
 )
 from limit_surface_ros.motion.sliding.friction import NormFriction
 from limit_surface_ros.motion.sliding.inertia import Inertia
-from limit_surface_ros.motion.sliding.slide import TOLERANCE, slide_body
+from limit_surface_ros.motion.sliding.slide import TOLERANCE, slide_stages
+from limit_surface_ros.motion.stages import finish
 from limit_surface_ros.surface.base import LimitSurface
 
 if TYPE_CHECKING:
@@ -120,7 +121,7 @@ def slides(
             scaled = np.linalg.norm(last / units.reshape(-1, 3), axis=1, keepdims=True)
             directions[rested] = last / scaled
     for row in np.flatnonzero(alone).tolist():
-        found = slide_body(bodies[row], starts[row], load, places[row])
+        found = finish(slide_stages(bodies[row], starts[row], load, places[row]))
         times[row], ends[row], directions[row] = found.time, found.pose, found.final_direction
     return Slides(times, ends, directions, alone)
 

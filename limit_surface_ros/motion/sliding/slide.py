@@ -10,12 +10,13 @@ weight forwards, which is not considered. See S. Goyal, A. Ruina and J. Papadopo
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from limit_surface_ros.checks import as_positive, as_vectors
 from limit_surface_ros.errors import RangeError, ShapeError, SolverError, UnstableError
 from limit_surface_ros.motion.sliding.body import SlidingBody
 from limit_surface_ros.motion.sliding.run import Run
+from limit_surface_ros.motion.stages import finish
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
     from limit_surface_ros.motion.sliding.load import Load
     from limit_surface_ros.motion.sliding.result import Slide
     from limit_surface_ros.surface.base import LimitSurface
-
-Result = TypeVar("Result")
 
 # Error of one step, in parts of the slide: of a shoved body, and of one under a load.
 TOLERANCE, LOAD_TOLERANCE = 1e-8, 1e-9
@@ -77,31 +76,9 @@ def slide(
         >>> round(found.time, 6), found.pose.round(6).tolist()
         (0.5, [0.25, 0.0, 0.0])
     """
-    return slide_body(
-        SlidingBody(surface, inertia),
-        twist,
-        load,
-        pose,
-        horizon=horizon,
-        tolerance=tolerance,
-        most_steps=most_steps,
-    )
-
-
-def slide_body(
-    body: SlidingBody,
-    twist: ArrayLike,
-    load: Load | None = None,
-    pose: ArrayLike = (0.0, 0.0, 0.0),
-    *,
-    horizon: float = math.inf,
-    tolerance: float | None = None,
-    most_steps: int = MOST_STEPS,
-) -> Slide:
-    """Return how a body that is prepared slides to rest; see `slide`."""
     return finish(
         slide_stages(
-            body,
+            SlidingBody(surface, inertia),
             twist,
             load,
             pose,
@@ -122,10 +99,7 @@ def slide_stages(
     tolerance: float | None = None,
     most_steps: int = MOST_STEPS,
 ) -> Generator[None, None, Slide]:
-    """Return a generator that slides a body in stages of some milliseconds; see `slide`.
-
-    What a generator returns is the value of the StopIteration that ends it.
-    """
+    """Return a generator that slides a body in stages of some milliseconds; see `slide`."""
     start, place = as_vectors("twist", twist), as_vectors("pose", pose)
     for name, array in (("twist", start), ("pose", place)):
         if array.shape != (3,):
@@ -136,16 +110,6 @@ def slide_stages(
         tolerance = TOLERANCE if load is None else LOAD_TOLERANCE
     tolerance = as_positive("tolerance", tolerance)
     return Run(body, load, horizon, tolerance, most_steps).stages(start, place)
-
-
-def finish(stages: Generator[None, None, Result]) -> Result:
-    """Run a generator to its end without a pause, and return what it returns."""
-    while True:
-        try:
-            next(stages)
-        except StopIteration as end:
-            result: Result = end.value
-            return result
 
 
 def stop_bracket(
@@ -185,21 +149,10 @@ def bracket_stages(
     *,
     horizon: float = math.inf,
 ) -> Generator[None, None, tuple[float, float]]:
-    """Return a generator that finds `stop_bracket` in stages of some milliseconds."""
+    """Find `stop_bracket` in stages of some milliseconds."""
     error = float(max_error)
     if not error >= 0.0:
         raise RangeError(f"max_error must be at least 0, got {error:g}")
-    return _bracket(body, twist, load, error, pose, horizon)
-
-
-def _bracket(
-    body: SlidingBody,
-    twist: ArrayLike,
-    load: Load,
-    error: float,
-    pose: ArrayLike,
-    horizon: float,
-) -> Generator[None, None, tuple[float, float]]:
     times = []
     start = load.decay.start
     for sign in (-1.0, 1.0):

@@ -32,12 +32,11 @@ from limit_surface_ros.motion.slip import (
 from limit_surface_ros.nodes.messages import convert
 from limit_surface_ros.nodes.messages.convert import SECOND, nanoseconds
 from limit_surface_ros.nodes.messages.planar_input import twist_at_origin
+from limit_surface_ros.nodes.serving.batches import in_turns
 from limit_surface_ros.nodes.serving.endpoints import Service
 from limit_surface_ros.nodes.serving.settings import Setting
 
 if TYPE_CHECKING:
-    from collections.abc import Generator
-
     from geometry_msgs.msg import InertiaStamped, WrenchStamped
 
     from limit_surface_ros.checks import Floats
@@ -89,16 +88,6 @@ class Start(NamedTuple):
     height: float
     time: int
     frame: str
-
-
-async def _in_turns(node: Any, stages: Generator[None, None, Any]) -> Any:
-    """Return what a generator returns, and let others have their turn at each of its pauses."""
-    while True:
-        try:
-            next(stages)
-        except StopIteration as end:
-            return end.value
-        await node.endpoints.give_way()
 
 
 async def _inertia_of(node: Any, model: SurfaceModel, stamped: InertiaStamped) -> Inertia:
@@ -172,11 +161,14 @@ async def predict_slide(
     body = SlidingBody(surface, inertia)
     # In the axes of the surface's frame as it is at the start.
     place = (*model.reference_point, 0.0)
-    found: Slide = await _in_turns(node, slide_stages(body, twist, load, place, horizon=horizon))
+    found: Slide = await in_turns(
+        node.endpoints, slide_stages(body, twist, load, place, horizon=horizon)
+    )
     earliest = latest = found.time
     if load is not None:
-        earliest, latest = await _in_turns(
-            node, bracket_stages(body, twist, load, decay.max_error, place, horizon=horizon)
+        earliest, latest = await in_turns(
+            node.endpoints,
+            bracket_stages(body, twist, load, decay.max_error, place, horizon=horizon),
         )
     response.stop_time = found.time
     response.earliest_stop_time, response.latest_stop_time = earliest, latest
@@ -240,10 +232,9 @@ async def predict_stop(
         inertia = await _inertia_of(node, model, request.inertia)
         body, load = SlidingBody(surface, inertia), Load(wrench, decay.sum, request.load_in_world)
         rest = (0.0, 0.0, 0.0)
-        found = await _in_turns(node, slide_stages(body, rest, load, horizon=LONGEST))
-        earliest, latest = await _in_turns(
-            node, bracket_stages(body, rest, load, decay.max_error, horizon=LONGEST)
-        )
+        found = await in_turns(node.endpoints, slide_stages(body, rest, load, horizon=LONGEST))
+        bracket = bracket_stages(body, rest, load, decay.max_error, horizon=LONGEST)
+        earliest, latest = await in_turns(node.endpoints, bracket)
         response.has_stop_time, response.stop_time = True, found.time
         response.earliest_stop_time, response.latest_stop_time = earliest, latest
         last = max(found.time, last)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import time
 from array import array
 from typing import TYPE_CHECKING, Any
 
@@ -15,20 +14,14 @@ from limit_surface_ros.checks import as_floats
 from limit_surface_ros.errors import DataError, FrameError, RangeError, ShapeError
 from limit_surface_ros.motion.outcomes import MODES
 from limit_surface_ros.motion.outline import Polygon
-from limit_surface_ros.motion.rollout import (
-    DEFAULT_ACCURACY,
-    OVERLAPS,
-    push_run_steps,
-    push_steps,
-)
+from limit_surface_ros.motion.rollout import DEFAULT_ACCURACY, OVERLAPS, Pushing
 from limit_surface_ros.nodes.messages import convert
 from limit_surface_ros.nodes.messages.planar_input import wrench_at_origin
+from limit_surface_ros.nodes.serving.batches import in_turns
 from limit_surface_ros.nodes.serving.endpoints import Service
 from limit_surface_ros.surface.frames import RigidTransform
 
 if TYPE_CHECKING:
-    from collections.abc import Generator
-
     from geometry_msgs.msg import Pose
     from nav_msgs.msg import Path
 
@@ -40,8 +33,6 @@ if TYPE_CHECKING:
 MOST_POSES = 1000
 # Pushes of a batch that are accepted.
 MOST_PUSHES = 100_000
-# Time between turns of others [s].
-TURN = 0.003
 # Accuracy that is still answered [m]: each thousandth costs ten times as long.
 FINEST = 1e-9
 # How far the z axis of a pose may lean, as a cosine.
@@ -57,18 +48,8 @@ async def simulate_one(
     model = node.host.models[request.model]
     tips, stamps = _tips(request)
     outline = outline_of(model, request)
-    steps = push_run_steps(
-        node.input.policy.surface_of(model),
-        outline,
-        request.tip_radius,
-        request.friction,
-        _planar_pose(request.start),
-        tips,
-        accuracy=_accuracy(request.accuracy),
-        overlap=_overlap(request.overlap),
-        reference_point=model.reference_point,
-    )
-    run = await _with_turns(node, steps)
+    stages = _pushing(node, model, outline, request).along(_planar_pose(request.start), tips)
+    run = await in_turns(node.endpoints, stages)
     first = convert.nanoseconds(request.header.stamp)
     if stamps is None:
         times = np.zeros(len(run.path_lengths))
@@ -109,18 +90,9 @@ async def simulate_many(
             "poses, tip_starts and tip_ends must be as many, "
             f"got {len(poses)}, {len(starts)} and {len(ends)}"
         )
-    steps = push_steps(
-        node.input.policy.surface_of(model),
-        outline_of(model, request),
-        request.tip_radius,
-        request.friction,
-        poses,
-        np.stack([starts, ends], axis=1),
-        accuracy=_accuracy(request.accuracy),
-        overlap=_overlap(request.overlap),
-        reference_point=model.reference_point,
-    )
-    runs = await _with_turns(node, steps)
+    pushing = _pushing(node, model, outline_of(model, request), request)
+    stages = pushing.along_each(poses, np.stack([starts, ends], axis=1))
+    runs = await in_turns(node.endpoints, stages)
     answer = SimulatePushes.Response
     outcomes = np.where(np.isnan(runs.left_at), answer.TOUCHES, answer.LEAVES)
     outcomes = np.where(np.isnan(runs.touched_at), answer.MISSES, outcomes)
@@ -130,17 +102,17 @@ async def simulate_many(
     response.estimated_errors = convert.flat_of(runs.errors)
 
 
-async def _with_turns(node: Any, steps: Generator[None, None, Any]) -> Any:
-    """Return what steps lead to; others have their turns in between."""
-    begin = time.perf_counter()
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            return end.value
-        if time.perf_counter() - begin > TURN:
-            await node.endpoints.give_way()
-            begin = time.perf_counter()
+def _pushing(node: Any, model: SurfaceModel, outline: Outline, request: Any) -> Pushing:
+    """Return the body and the tip of a request."""
+    return Pushing(
+        node.input.policy.surface_of(model),
+        outline,
+        request.tip_radius,
+        request.friction,
+        _accuracy(request.accuracy),
+        _overlap(request.overlap),
+        model.reference_point,
+    )
 
 
 def _accuracy(asked: float) -> float:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Long batches in slices: others are served between them, and of several one runs at a time."""
+"""Long work in slices between which others are served; of several batches one runs at a time."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import collections
 import time
 from array import array
 from math import ceil
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -16,12 +16,14 @@ from limit_surface_ros.errors import UnavailableError
 from limit_surface_ros.nodes.serving.endpoints import Waiting
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Generator
 
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.nodes.serving.endpoints import Endpoints
 
-# Time that one slice may take [s]: how long a topic waits in the middle of a batch.
+Found = TypeVar("Found")
+
+# Time that one slice may take [s]: how long a topic waits in the middle of long work.
 SLICE = 0.003
 # Rows of the first slice of all, of which it is learnt how long rows take; a batch of so many is
 # answered in one slice and waits for no other.
@@ -105,6 +107,20 @@ class Batches:
     def _refuse_next(self, error: Exception) -> None:
         if self._queue:
             self._queue.popleft().settle(error)
+
+
+async def in_turns(endpoints: Endpoints, stages: Generator[None, None, Found]) -> Found:
+    """Return what a generator returns; others have their turns at its pauses."""
+    begin = time.perf_counter()
+    while True:
+        try:
+            next(stages)
+        except StopIteration as end:
+            found: Found = end.value
+            return found
+        if time.perf_counter() - begin > SLICE:
+            await endpoints.give_way()
+            begin = time.perf_counter()
 
 
 def empty_rows(rows: int, columns: int) -> tuple[array[float], Floats]:
