@@ -29,6 +29,8 @@ _KEPT = 256
 _MOST_INTERVALS = 20_000
 # Part of the whole interval to which a time is found.
 _RESOLUTION = 1e-15
+# Part of a level that counts as none, as rounding leaves more of it.
+_EXACT = 4e-16
 # Phase in a cell from which on a term is as good as vanished in the next.
 _FASTEST = 1e100
 # A supremum is proven to this part of itself, unless that takes more cells than this.
@@ -163,7 +165,11 @@ class LevelSearch:
                 # Steeper than the curvature can undo, x falls through the level once.
                 if abs(slope) * width > cells.curvatures[cell]:
                     return root_bracket(
-                        lambda t: level - abs(self._at_one(t)), left, right, resolution
+                        lambda t: level - abs(self._at_one(t)),
+                        left,
+                        right,
+                        resolution,
+                        _EXACT * level,
                     )[1]
             found = self._last_within(left, right, level, resolution)
             if found is not None:

@@ -10,8 +10,8 @@ doi:10.1177/0278364917698747.
 All angles are measured from the inward normal. The angle of the velocity that a force causes at
 the contact never falls as the force turns to the left, and lies within 90 deg of the force's:
 one comparison with the pusher's angle at each edge of the friction cone tells the mode, whatever
-the friction. `push` answers one question in plain floats through the surface's public maps,
-`pushes` many at once by `push_batch`.
+the friction. `push` answers one question in plain floats, through the surface's maps for one
+vector, `pushes` many at once by `push_batch`.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One push in plain floats, through the public maps of a surface for one vector."""
+"""One push in plain floats, through the maps of a surface for one vector."""
 
 from __future__ import annotations
 
-from functools import cache
 from math import atan2, cos, hypot, sin
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
@@ -126,34 +125,50 @@ class ContactScalar:
         def motion(rate: float) -> tuple[float, float, float]:
             return vx + rate * self._y, vy - rate * self._x, rate
 
-        @cache
-        def load(rate: float) -> Floats:
-            return surface.wrench_of_twist(motion(rate))
+        load_scalar = surface.shape.load_scalar
+        length, force = surface.scaling.characteristic_length, surface.scaling.friction_force
+        loads: dict[float, tuple[float, ...]] = {}
 
         def moment(rate: float) -> float:
-            fx, fy, torque = load(rate).tolist()
-            return float(torque - self._x * fy + self._y * fx)
+            if rate not in loads:
+                x, y, turning = motion(rate)
+                scaled = load_scalar((x, y, length * turning))
+                if scaled is None:
+                    loads[rate] = tuple(surface.wrench_of_twist((x, y, turning)).tolist())
+                else:
+                    fx, fy, torque = scaled
+                    loads[rate] = force * fx, force * fy, force * length * torque
+            fx, fy, torque = loads[rate]
+            return torque - self._x * fy + self._y * fx
 
-        reach = 1.0 / surface.scaling.characteristic_length
+        # Of no turning, and as far to the side of the root as need be.
+        side = -1.0 if moment(0.0) > 0.0 else 1.0
+        near, far = 0.0, side / length
         for _ in range(_DOUBLINGS):
-            if moment(-reach) <= 0.0 <= moment(reach):
+            if side * moment(far) >= 0.0:
                 break
-            reach *= 2.0
-        unit = float(surface.scaling.wrench_unit[2])
+            near, far = far, 2.0 * far
+        unit = force * length
         low, high = root_bracket(
-            moment, -reach, reach, _WIDTH * reach, _EXACT * unit, _STRAIGHT * unit * unit
+            moment,
+            min(near, far),
+            max(near, far),
+            _WIDTH * abs(far),
+            _EXACT * unit,
+            _STRAIGHT * unit * unit,
         )
         below, above = moment(low), moment(high)
         share = below / (below - above) if below < above else 0.5
-        wrench = (1.0 - share) * load(low) + share * load(high)
-        fx, fy, _ = wrench.tolist()
+        fx, fy, torque = (
+            (1.0 - share) * a + share * b for a, b in zip(loads[low], loads[high], strict=True)
+        )
         across = turn(self.normal, (fx, fy))
         if abs(across) * self._along > self._across * product(self.normal, (fx, fy)):
             if across > 0.0:
                 return self.edge(1.0), ContactMode.SLIDE_LEFT
             return self.edge(-1.0), ContactMode.SLIDE_RIGHT
         rate = (1.0 - share) * low + share * high
-        return Push(np.array(motion(rate)), ContactMode.STICK, wrench)
+        return Push(np.array(motion(rate)), ContactMode.STICK, np.array((fx, fy, torque)))
 
     def wrench(self, force: _Pair, twist: Floats) -> Floats:
         """Return the wrench on the surface (3,) along a force that causes a twist."""

@@ -198,8 +198,10 @@ async def wrench_to_twist(
     if model.uncertain is not None:
         answer = model.uncertain.of_twist(wrench, twist, request.probability or PROBABILITY)
         response.has_covariance = True
-        response.covariance = covariance_at_origin(model, answer.covariance)
-        response.half_axes = answer.half_axes
+        response.covariance = convert.finite_rows(
+            "covariance", covariance_at_origin(model, answer.covariance)
+        )
+        response.half_axes = convert.finite_rows("half_axes", answer.half_axes)
     elif request.probability:
         region_quantile(request.probability)
     for stamped in (response.twist, response.limit_wrench):
@@ -287,7 +289,9 @@ async def push_at_a_point(
 
 
 SERVICES = (
-    Service(WrenchToTwist, "wrench_to_twist", wrench_to_twist),
+    Service(
+        WrenchToTwist, "wrench_to_twist", wrench_to_twist, checked=("covariance", "half_axes")
+    ),
     Service(TwistToWrench, "twist_to_wrench", twist_to_wrench),
     Service(
         WrenchesToTwists,

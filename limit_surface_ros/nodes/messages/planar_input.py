@@ -285,11 +285,15 @@ class PlanarInput:
         velocity = convert.vector_components("velocity", request.velocity)
         # From 0 to infinity: `push` looks at it.
         friction = request.friction
-        transform = await self.transform(model, request.header)
-        point = transform.point(point).tolist()
-        normal = transform.direction(normal).tolist()
-        velocity = transform.direction(velocity).tolist()
-        return point[:2], normal[:2], friction, velocity[:2]
+        frame, header = self.policy.frame_of(model), request.header
+        if header.frame_id and header.frame_id != frame:
+            transform = await self.frames.to_frame(frame, header)
+            if transform is not None:
+                point = transform.point(point).tolist()
+                normal = transform.direction(normal).tolist()
+                velocity = transform.direction(velocity).tolist()
+        x, y = model.reference_point
+        return (point[0] - x, point[1] - y), normal[:2], friction, velocity[:2]
 
     async def transform(self, model: SurfaceModel, header: Header) -> RigidTransform:
         """Return the transform from a header's frame to axes at a model's reference point.
