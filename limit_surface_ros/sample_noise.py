@@ -21,6 +21,9 @@ ORDERS = (2, 3, 4)
 _DEVIATION_OF_MEDIAN = 1.4826
 # Values that change no more often than that are held, and not rounded.
 _FEWEST_STEPS = 10
+# Rounded values stay on so many levels at least, once in so many samples, and are multiples of a
+# step to this part of it.
+_FEWEST_LEVELS, _OFTEN, _OFF_STEP = 5, 8, 1e-3
 
 
 def estimate_noise(times: ArrayLike, values: ArrayLike) -> float:
@@ -38,7 +41,7 @@ def estimate_noise(times: ArrayLike, values: ArrayLike) -> float:
 
     Returns:
         The deviation in the unit of `values`; 0 for fewer than 6 samples. Of values that are
-        rounded to steps, most of them equal to others, at least the step over sqrt(12).
+        rounded to steps, many of them equal to the one before, at least the step over sqrt(12).
 
     Raises:
         ShapeError: The two are not lists of one length.
@@ -78,14 +81,19 @@ def _noise_of_order(times: Floats, values: Floats, order: int) -> float:
 
 
 def _rounding_noise(values: Floats) -> float:
-    """Return the noise that rounding makes; 0 if fewer than half of the values repeat others.
+    """Return the noise that rounding makes; 0 if the values do not look rounded.
 
-    Rounded values share most of their levels; a response that is constant for a while has one or
-    two levels that many values share, and others that none do.
+    Rounded values are multiples of one step, or most of their levels are held, and they stay on
+    many levels for two samples or more. A response stays on the few levels on which it is
+    constant; where it runs straight, up and down, it takes levels again but stays on none.
     """
-    distinct, counts = np.unique(values, return_counts=True)
-    if np.count_nonzero(np.diff(values)) < _FEWEST_STEPS:
+    stays = np.diff(values) == 0.0
+    held = np.unique(values[1:][stays])
+    changes, often = np.count_nonzero(~stays), _OFTEN * np.count_nonzero(stays) >= len(values)
+    if changes < _FEWEST_STEPS or len(held) < _FEWEST_LEVELS or not often:
         return 0.0
-    if len(distinct) < 2 or 2 * len(distinct) >= len(values) or np.median(counts) < 2:
-        return 0.0
-    return float(np.diff(distinct).min()) / math.sqrt(12.0)
+    levels = np.unique(values)
+    step = float(np.diff(levels).min())
+    multiples = (levels - levels[0]) / step
+    on_steps = float(np.abs(multiples - np.round(multiples)).max()) < _OFF_STEP
+    return step / math.sqrt(12.0) if on_steps or 2 * len(held) >= len(levels) else 0.0

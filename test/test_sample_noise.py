@@ -36,6 +36,11 @@ def test_rounded_values_have_the_noise_of_rounding():
     times = np.linspace(0.0, 1.0, 2000)
     values = np.round(0.05 * times, 3)
     assert estimate_noise(times, values) == pytest.approx(1e-3 / np.sqrt(12.0), rel=1e-6)
+    # A steep start takes each level once, the slow end stays on most.
+    decaying = np.round(8.0 * np.exp(-6.0 * times[::7]), 1)
+    assert estimate_noise(times[::7], decaying) == pytest.approx(0.1 / np.sqrt(12.0), rel=1e-6)
+    zigzag = np.abs(np.arange(2000) % 100 - 50.0)
+    assert estimate_noise(times, zigzag) < 1e-12
     held = np.where(times < 0.3, 0.01, 1.0)
     assert estimate_noise(times, held) < 1e-14
     assert estimate_noise(times, np.full(2000, 3.0)) < 1e-14

@@ -25,7 +25,7 @@ from limit_surface_ros.decay.grids import fit_times, is_steep
 from limit_surface_ros.decay.least_squares import least_squares_fit, require_samples
 from limit_surface_ros.decay.neutral import neutral_rates
 from limit_surface_ros.decay.noise import LEAST_SAMPLES, is_noisy, noise_level
-from limit_surface_ros.decay.outliers import running_median
+from limit_surface_ros.decay.outliers import holds_strays, running_median
 from limit_surface_ros.decay.polish import polished_rates
 from limit_surface_ros.decay.rates import RateChoice
 from limit_surface_ros.decay.steep import steep_rates
@@ -137,7 +137,8 @@ def fit_decay(
             system, the thesis), "neutral" (closed-form roots), "esprit" (from samples),
             "polished" (ESPRIT's rates, then moved to reduce the error unless the record is noisy),
             "least_squares" (free rates, of samples alone), or "best": least_squares if the record
-            is noisy or an offset is asked for, else the better of neutral and polished.
+            is noisy or holds stray samples, or an offset is asked for, else the better of neutral
+            and polished.
         norm: In which norm the coefficients are fitted, see `fit_coefficients`; "auto": the
             2-norm after least_squares, else the infinity norm. Rates are chosen by the 2-norm in
             least_squares and else by the infinity norm.
@@ -167,8 +168,11 @@ def fit_decay(
     tell = progress or (lambda line: None)
     start = time.perf_counter()
     noise = noise_level(response)
+    strays = (
+        chosen.robust and isinstance(response, Record) and holds_strays(response.values, noise)
+    )
     by_samples = method == "least_squares" or (
-        method == "best" and (chosen.offset or is_noisy(response))
+        method == "best" and (chosen.offset or strays or is_noisy(response))
     )
     if by_samples:
         found = least_squares_fit(

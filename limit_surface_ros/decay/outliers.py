@@ -23,6 +23,8 @@ WINDOW = 7
 HAMPEL, SPREADS = 6.5, 1.5
 # Its weight falls from so many deviations of a residual on, and is 0 from twice as many.
 HALF_GATE = 3.0
+# A stray sample is so many times as far from its neighbours as they are from each other.
+STRAY = 5.0
 # A steep start has no neighbours before it.
 EXEMPT = 3
 _DEVIATION_OF_MEDIAN = 1.4826
@@ -46,12 +48,33 @@ def stand_out(values: Floats, noise: float) -> Bools:
     """
     if len(values) < 2 * WINDOW:
         return np.zeros(len(values), dtype=bool)
-    medians = running_median(values)
+    # The last samples have neighbours on one side only: there the record is taken to go on as
+    # straight as it came, or the last of a slope would stand out from the median before it.
+    last = values[-WINDOW:]
+    slope = np.median(np.diff(last))
+    ahead = np.median(last) + slope * (WINDOW // 2 + np.arange(1, WINDOW // 2 + 1))
+    medians = running_median(np.append(values, ahead))[: len(values)]
     windows = sliding_window_view(np.pad(medians, WINDOW // 2, mode="edge"), WINDOW)
     spread = windows.max(axis=-1) - windows.min(axis=-1)
     marked: Bools = np.abs(values - medians) > HAMPEL * noise + SPREADS * spread
     marked[:EXEMPT] = False
     return marked
+
+
+def holds_strays(values: Floats, noise: float) -> bool:
+    """Tell whether samples stand out that neither a kink nor a jump of a response would explain.
+
+    A stray sample is further from the two on either side than these are from each other, by far.
+
+    Args:
+        values: Shape (n,).
+        noise: Their standard deviation, in the same unit.
+    """
+    marked = stand_out(values, noise)
+    inner = np.flatnonzero(marked[2:-2]) + 2
+    around = values[inner[:, np.newaxis] + np.array([-2, -1, 1, 2])]
+    away = np.abs(values[inner, np.newaxis] - around).min(axis=1)
+    return bool((away > STRAY * (np.ptp(around, axis=1) + noise)).any())
 
 
 def neighbour_weights(residuals: Floats, noise: float) -> Floats:

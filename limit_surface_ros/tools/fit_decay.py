@@ -51,8 +51,8 @@ EXAMPLES = """methods:
   least_squares
             free rates of a record's samples; outliers count for nothing, and with --offset free a
             constant is fitted beside the terms
-  best      least_squares for a noisy record or --offset free, else the better of neutral and
-            polished
+  best      least_squares for a record that is noisy or holds stray samples, or --offset free, else
+            the better of neutral and polished
 
 After the interval the response is assumed to stay within its largest value over the last tenth of
 it, or over its last swing. Every fit is held to that there, or to its error if that is larger, and

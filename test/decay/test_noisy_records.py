@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from limit_surface_ros.decay.fit import Options, fit_decay
-from limit_surface_ros.decay.outliers import neighbour_weights, stand_out
+from limit_surface_ros.decay.outliers import holds_strays, neighbour_weights, stand_out
 from limit_surface_ros.decay.targets import Analytic, Record
 from limit_surface_ros.errors import DataError, RangeError
 
@@ -36,6 +36,34 @@ def test_three_outliers_of_600_are_named_and_count_for_nothing():
     assert np.abs(fit.fit.sum(times) - np.exp(-2.0 * times)).max() < 1e-3
     assert fit.noise == pytest.approx(1e-3, rel=0.2)
     assert fit.fit.max_error < 5e-3
+
+
+@pytest.mark.parametrize("stray", [0.0, 6.0])
+def test_a_stray_sample_in_a_clean_record_counts_for_nothing(stray):
+    clean = record(lambda t: np.exp(-t))
+    values = clean.values.copy()
+    values[250] = stray
+    fit = fit_decay(Record(clean.knots, values), 1, 6.0)
+    np.testing.assert_array_equal(fit.outliers, clean.knots[[250]])
+    assert fit.fit.sum.rates[0] == pytest.approx(-1.0, abs=1e-9)
+
+
+def test_no_clean_response_holds_stray_samples():
+    times = np.linspace(0.0, 6.0, 601)
+    for response in (
+        np.exp(-times),
+        np.cos(30.0 * times),
+        np.where(times < 3.0, 1.0, 0.0),
+        np.abs(2.0 * ((1.3 * times) % 1.0) - 1.0),
+    ):
+        assert not holds_strays(response, 0.0)
+
+
+def test_the_last_sample_of_a_slope_does_not_stand_out():
+    slope = np.exp(-np.linspace(0.0, 3.0, 101))
+    assert not stand_out(slope, 0.0).any()
+    slope[-1] = 1.0
+    np.testing.assert_array_equal(np.flatnonzero(stand_out(slope, 0.0)), [100])
 
 
 def test_outliers_spoil_a_fit_that_is_told_to_keep_them():
