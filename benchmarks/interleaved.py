@@ -13,7 +13,10 @@ if TYPE_CHECKING:
 
 
 def interleaved(
-    ways: Mapping[str, Callable[[], object]], rounds: int = 7, least: float = 0.02
+    ways: Mapping[str, Callable[[], object]],
+    rounds: int = 7,
+    least: float = 0.02,
+    clock: Callable[[], float] = time.perf_counter,
 ) -> dict[str, float]:
     """Return the median time [s] of one call of each way.
 
@@ -21,23 +24,24 @@ def interleaved(
         ways: What to call, by name.
         rounds: Turns that each way gets after a first that does not count.
         least: How long a turn lasts at least [s]; short calls are repeated within it.
+        clock: `time.thread_time` leaves out what other programs take.
     """
     repeats = {}
     for name, call in ways.items():
         call()
-        begin = time.perf_counter()
+        begin = clock()
         call()
-        repeats[name] = 1 + int(least / max(time.perf_counter() - begin, 1e-7))
+        repeats[name] = 1 + int(least / max(clock() - begin, 1e-7))
     times: dict[str, list[float]] = {name: [] for name in ways}
     collects = gc.isenabled()
     gc.disable()
     try:
         for _ in range(rounds):
             for name, call in ways.items():
-                begin = time.perf_counter()
+                begin = clock()
                 for _ in range(repeats[name]):
                     call()
-                times[name].append((time.perf_counter() - begin) / repeats[name])
+                times[name].append((clock() - begin) / repeats[name])
     finally:
         if collects:
             gc.enable()

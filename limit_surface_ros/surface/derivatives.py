@@ -8,6 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.checks import as_rows
+from limit_surface_ros.surface.gauges import scalar_jacobians
+from limit_surface_ros.surface.gauges.jacobians import (
+    direction_jacobians,
+    gradients_and_hessians,
+)
 from limit_surface_ros.surface.scaling import InScaledVariables, write_rows
 
 if TYPE_CHECKING:
@@ -43,8 +48,24 @@ class Derivatives(InScaledVariables):
             >>> jacobian.round(12).tolist()
             [[0.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.5]]
         """
-        _, twists, jacobians = self._twist_derivatives(wrench)
-        return twists, jacobians
+        scaling = self.scaling
+        one = self._one_load(wrench)
+        found = None if one is None else self.shape.motion_turning_scalar(one)
+        if found is not None:
+            unit, derivatives = scalar_jacobians.direction_jacobian(found[1], found[2])
+            jacobian = np.array(derivatives).reshape(3, 3)
+            jacobian *= scaling.twist_by_wrench_unit
+            return self._twist_along(unit), jacobian
+        array = as_rows("wrench", wrench)
+        twists, jacobians = np.empty((array.size // 3, 3)), np.empty((array.size // 3, 3, 3))
+        for block, columns, sizes in self._blocks("wrench", array, scaling.wrench_unit):
+            turning, _ = self.shape.motions_turning(columns)
+            units, of_block = direction_jacobians(
+                turning.normals, turning.matrices, sizes, scaling.twist_by_wrench_unit
+            )
+            write_rows(units, scaling.twist_unit, twists[block])
+            jacobians[block].transpose(1, 2, 0)[...] = of_block
+        return twists.reshape(array.shape), jacobians.reshape(*array.shape, 3)
 
     def quadratic_twist(self, wrench: ArrayLike) -> tuple[Floats, Floats]:
         """Load factor times its gradient, and the derivative of that by the wrench.
@@ -67,20 +88,15 @@ class Derivatives(InScaledVariables):
             DataError: The kind has no derivatives in closed form.
         """
         array = as_rows("wrench", wrench)
-        factors, twists, jacobians = self._twist_derivatives(array)
-        power = (twists * array).sum(axis=-1)
-        gradients = twists * (factors / power)[..., np.newaxis]
-        # g Hess g: what the unit twist's derivative is across it, made symmetric by Euler's
-        # theorem, Hess g w = 0.
-        unit = self.scaling.twist_unit
-        length = np.sqrt((np.square(gradients / unit)).sum(axis=-1))
-        across = jacobians * length[..., np.newaxis, np.newaxis]
-        # What is missing along the twist follows from w' Hess g = 0.
-        missing = np.einsum("...i,...ij->...j", array, across) / power[..., np.newaxis]
-        hessians = across - twists[..., :, np.newaxis] * missing[..., np.newaxis, :]
-        k = gradients[..., :, np.newaxis] * gradients[..., np.newaxis, :]
-        k += factors[..., np.newaxis, np.newaxis] * hessians
-        return gradients * factors[..., np.newaxis], 0.5 * (k + np.swapaxes(k, -1, -2))
+        unit = 1.0 / self.scaling.wrench_unit
+        twists, jacobians = np.empty((array.size // 3, 3)), np.empty((array.size // 3, 3, 3))
+        for block, columns, sizes in self._blocks("wrench", array, self.scaling.wrench_unit):
+            turning, _ = self.shape.motions_turning(columns)
+            gradients, matrices = gradients_and_hessians(columns, turning)
+            gradients *= sizes
+            write_rows(gradients, unit, twists[block])
+            _write_symmetric(matrices, np.multiply.outer(unit, unit), jacobians[block])
+        return twists.reshape(array.shape), jacobians.reshape(*array.shape, 3)
 
     def wrench_jacobian(self, twist: ArrayLike) -> tuple[Floats, Floats]:
         """Load of maximum dissipation, and its derivative by the twist.
@@ -98,14 +114,20 @@ class Derivatives(InScaledVariables):
             ZeroVectorError: A twist is zero.
             DataError: The kind has no derivatives in closed form.
         """
+        scaling = self.scaling
+        one = self._one_motion(twist)
+        found = None if one is None else self.shape.load_turning_scalar(one)
+        if found is not None:
+            load, (xx, xy, xz, yy, yz, zz) = found
+            jacobian = np.array((xx, xy, xz, xy, yy, yz, xz, yz, zz)).reshape(3, 3)
+            jacobian *= scaling.wrench_by_twist_unit
+            return self._wrench_of(load), jacobian
         array = as_rows("twist", twist)
-        unit_in, unit_out = self.scaling.twist_unit, self.scaling.wrench_unit
-        count = array.size // 3
-        wrenches, jacobians = np.empty((count, 3)), np.empty((count, 3, 3))
-        for block, columns, sizes in self._blocks("twist", array, unit_in):
-            loads, derivatives, _ = self.shape.load_jacobians(columns)
-            write_rows(loads, unit_out, wrenches[block])
-            _write_jacobians(derivatives, unit_out, unit_in, sizes, jacobians[block])
+        wrenches, jacobians = np.empty((array.size // 3, 3)), np.empty((array.size // 3, 3, 3))
+        for block, columns, sizes in self._blocks("twist", array, scaling.twist_unit):
+            loads, matrices, _ = self.shape.loads_turning(columns)
+            write_rows(loads, scaling.wrench_unit, wrenches[block])
+            _write_symmetric(matrices / sizes, scaling.wrench_by_twist_unit, jacobians[block])
         return wrenches.reshape(array.shape), jacobians.reshape(*array.shape, 3)
 
     def is_smooth_at(self, wrench: ArrayLike) -> Bools:
@@ -113,33 +135,20 @@ class Derivatives(InScaledVariables):
         array = as_rows("wrench", wrench)
         smooth = np.empty(array.size // 3, dtype=bool)
         for block, columns, _ in self._blocks("wrench", array, self.scaling.wrench_unit):
-            smooth[block] = self.shape.motion_jacobians(columns)[3]
+            smooth[block] = self.shape.motions_turning(columns)[1]
         return smooth.reshape(array.shape[:-1])
 
-    def _twist_derivatives(self, wrench: ArrayLike) -> tuple[Floats, Floats, Floats]:
-        """Return load factors (...), twists (..., 3) and their Jacobians (..., 3, 3)."""
-        array = as_rows("wrench", wrench)
-        unit_in, unit_out = self.scaling.wrench_unit, self.scaling.twist_unit
-        count = array.size // 3
-        factors, twists = np.empty(count), np.empty((count, 3))
-        jacobians = np.empty((count, 3, 3))
-        for block, columns, sizes in self._blocks("wrench", array, unit_in):
-            found, motions, derivatives, _ = self.shape.motion_jacobians(columns)
-            np.multiply(found, sizes, out=factors[block])
-            write_rows(motions, unit_out, twists[block])
-            _write_jacobians(derivatives, unit_out, unit_in, sizes, jacobians[block])
-        shape = array.shape[:-1]
-        return (
-            factors.reshape(shape)[()],
-            twists.reshape(array.shape),
-            jacobians.reshape(*shape, 3, 3),
-        )
+    def wrench_is_smooth_at(self, twist: ArrayLike) -> Bools:
+        """Whether `wrench_of_twist` has a derivative at twists (..., 3); shape (...)."""
+        array = as_rows("twist", twist)
+        smooth = np.empty(array.size // 3, dtype=bool)
+        for block, columns, _ in self._blocks("twist", array, self.scaling.twist_unit):
+            smooth[block] = self.shape.loads_turning(columns)[2]
+        return smooth.reshape(array.shape[:-1])
 
 
-def _write_jacobians(
-    columns: Floats, unit_out: Floats, unit_in: Floats, sizes: Floats, out: Floats
-) -> None:
-    """Write scaled Jacobians (3, 3, m) at vectors of size one into (m, 3, 3), physical units."""
-    columns *= np.multiply.outer(unit_out, 1.0 / unit_in)[:, :, np.newaxis]
-    columns /= sizes
-    out.transpose(1, 2, 0)[...] = columns
+def _write_symmetric(six: Floats, units: Floats, out: Floats) -> None:
+    """Write symmetric matrices in six rows (6, m) times their units (3, 3) into (m, 3, 3)."""
+    matrices = six[[0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(3, 3, -1)
+    matrices *= units[:, :, np.newaxis]
+    out.transpose(1, 2, 0)[...] = matrices

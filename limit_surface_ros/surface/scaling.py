@@ -10,11 +10,18 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from math import sqrt
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limit_surface_ros.checks import as_directions, as_positive, as_rows, as_vectors
+from limit_surface_ros.checks import (
+    as_directions,
+    as_positive,
+    as_rows,
+    as_vectors,
+    one_direction,
+)
 from limit_surface_ros.runtime import keep_scratch
 
 if TYPE_CHECKING:
@@ -23,7 +30,11 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.gauges.gauge import Vector
     from limit_surface_ros.surface.shape import Shape
+
+# Sizes of a scaled vector between which its fourth powers are numbers, for the scalar maps.
+_SMALLEST, _LARGEST = 1e-70, 1e70
 
 
 @dataclass(frozen=True)
@@ -59,6 +70,16 @@ class Scaling:
         """(1, 1, 1 / rho) in [m/s, m/s, rad/s], shape (3,)."""
         return np.array([1.0, 1.0, 1.0 / self.characteristic_length])
 
+    @cached_property
+    def twist_by_wrench_unit(self) -> Floats:
+        """Of derivatives of twists by wrenches, shape (3, 3)."""
+        return np.multiply.outer(self.twist_unit, 1.0 / self.wrench_unit)
+
+    @cached_property
+    def wrench_by_twist_unit(self) -> Floats:
+        """Of derivatives of wrenches by twists, shape (3, 3)."""
+        return np.multiply.outer(self.wrench_unit, 1.0 / self.twist_unit)
+
 
 class InScaledVariables(ABC):
     """A shape and its scaling: vectors in physical units go to the shape and back in blocks.
@@ -73,6 +94,38 @@ class InScaledVariables(ABC):
     @abstractmethod
     def shape(self) -> Shape:
         """The surface in scaled variables."""
+
+    def _one_load(self, wrench: Any) -> Vector | None:
+        """Return a single, plainly valid wrench in scaled variables, None for anything else."""
+        one = one_direction(wrench)
+        if one is None:
+            return None
+        force = self.scaling.friction_force
+        x, y = one[0] / force, one[1] / force
+        z = one[2] / (force * self.scaling.characteristic_length)
+        return (x, y, z) if _SMALLEST < abs(x) + abs(y) + abs(z) < _LARGEST else None
+
+    def _one_motion(self, twist: Any) -> Vector | None:
+        """Return a single, plainly valid twist in scaled variables, None for anything else."""
+        one = one_direction(twist)
+        if one is None:
+            return None
+        x, y, z = one[0], one[1], one[2] * self.scaling.characteristic_length
+        return (x, y, z) if _SMALLEST < abs(x) + abs(y) + abs(z) < _LARGEST else None
+
+    def _wrench_of(self, load: Vector) -> Floats:
+        """Return the wrench of a scaled load."""
+        force = self.scaling.friction_force
+        torque = force * self.scaling.characteristic_length * load[2]
+        return np.array((force * load[0], force * load[1], torque))
+
+    def _twist_along(self, motion: Vector) -> Floats:
+        """Return the twist of unit norm along a scaled motion."""
+        x, y, z = motion
+        length = sqrt(x * x + y * y + z * z)
+        return np.array(
+            (x / length, y / length, z / (length * self.scaling.characteristic_length))
+        )
 
     def _mapped(
         self,

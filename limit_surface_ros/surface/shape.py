@@ -13,13 +13,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.errors import DataError
-from limit_surface_ros.surface.gauges.jacobians import support_hessians, unit_jacobians
+from limit_surface_ros.surface.gauges.gauge import Turning
+from limit_surface_ros.surface.gauges.jacobians import of_support
+from limit_surface_ros.surface.gauges.scalar_jacobians import support_hessian
 from limit_surface_ros.surface.linalg import of_unit_length
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Bools, Floats
-    from limit_surface_ros.surface.gauges.gauge import Gauge, ScalarGauge, Vector
+    from limit_surface_ros.surface.gauges.gauge import Gauge, ScalarGauge, Six, Vector
     from limit_surface_ros.surface.support.solvers import SupportSolver
+
+
+_STILL = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Shape(ABC):
@@ -66,23 +71,23 @@ class Shape(ABC):
         """Return the load on the surface with the most power for one motion, not zero."""
         return None
 
-    def motion_jacobians(self, loads: Floats) -> tuple[Floats, Floats, Floats, Bools]:
-        """Return factors, unit motions, the motions' derivatives by the load, and where smooth.
+    def motions_turning(self, loads: Floats) -> tuple[Turning, Bools]:
+        """Return load factors and motions, of any length, with how these turn with the loads.
 
         Args:
             loads: None is zero, and each is of size about one, shape (3, m).
 
         Returns:
-            Load factors (m,), motions (3, m), Jacobians (3, 3, m), and whether the map has a
-            derivative at each load (m,); where it has none the Jacobian is that of what is smooth.
+            These, and whether the map has a derivative at each load (m,); where it has none the
+            matrices are those of what is smooth there.
 
         Raises:
             DataError: The kind has no derivatives in closed form.
         """
         raise DataError("this kind of surface has no derivatives in closed form")
 
-    def load_jacobians(self, motions: Floats) -> tuple[Floats, Floats, Bools]:
-        """Return the loads of maximum dissipation, their derivatives, and where smooth.
+    def loads_turning(self, motions: Floats) -> tuple[Floats, Floats, Bools]:
+        """Return the loads of maximum dissipation, their derivatives (6, m), and where smooth.
 
         Args:
             motions: None is zero, and each is of size about one, shape (3, m).
@@ -91,6 +96,14 @@ class Shape(ABC):
             DataError: The kind has no derivatives in closed form.
         """
         raise DataError("this kind of surface has no derivatives in closed form")
+
+    def motion_turning_scalar(self, _load: Vector) -> tuple[float, Vector, Six] | None:
+        """Return what `motions_turning` does for one load where the map is smooth."""
+        return None
+
+    def load_turning_scalar(self, _motion: Vector) -> tuple[Vector, Six] | None:
+        """Return what `loads_turning` does for one motion where the map is smooth."""
+        return None
 
     def expect(self, _count: float) -> None:  # noqa: B027, most shapes have nothing to make
         """Make now what pays if so many vectors come at once; see `support.tabulated`."""
@@ -146,20 +159,25 @@ class GaugeShape(Shape):
         """Return the loads of maximum dissipation; see `Shape`."""
         return self.solver.solve(motions)[0]
 
-    def motion_jacobians(self, loads: Floats) -> tuple[Floats, Floats, Floats, Bools]:
-        """Return factors, motions and their derivatives; see `Shape`."""
-        factors, gradients, hessians = self._derivatives(loads)
-        smooth = np.asarray(np.isfinite(hessians).all(axis=(0, 1)))
-        return (factors, *unit_jacobians(gradients, hessians), smooth)
+    def motions_turning(self, loads: Floats) -> tuple[Turning, Bools]:
+        """Return factors and motions with how these turn; see `Shape`."""
+        turning = self._gauge.turning(loads)
+        return turning, _is_smooth(turning)
 
-    def load_jacobians(self, motions: Floats) -> tuple[Floats, Floats, Bools]:
+    def loads_turning(self, motions: Floats) -> tuple[Floats, Floats, Bools]:
         """Return loads and their derivatives; see `Shape`."""
         loads = self.loads(motions)
-        _, gradients, hessians = self._derivatives(loads)
-        return (loads, *support_hessians(motions, loads, gradients, hessians))
+        return (loads, *of_support(motions, loads, self._gauge))
 
-    def _derivatives(self, loads: Floats) -> tuple[Floats, Floats, Floats]:
-        return self._gauge.derivatives(loads, np.zeros(loads.shape[1]))
+    def motion_turning_scalar(self, load: Vector) -> tuple[float, Vector, Six] | None:
+        """Return the same for one load; see `Shape`."""
+        return self._scalar.turning(load)
+
+    def load_turning_scalar(self, motion: Vector) -> tuple[Vector, Six] | None:
+        """Return the same for one motion; see `Shape`."""
+        load = self.load_scalar(motion)
+        matrix = None if load is None else _of_support_scalar(self._scalar, motion, load)
+        return None if load is None or matrix is None else (load, matrix)
 
     def load_factor_scalar(self, load: Vector) -> float | None:
         """Return the load factor of one load; see `Shape`."""
@@ -235,21 +253,61 @@ class DissipationShape(Shape):
         power = motion[0] * load[0] + motion[1] * load[1] + motion[2] * load[2]
         return power, motion
 
-    def motion_jacobians(self, loads: Floats) -> tuple[Floats, Floats, Floats, Bools]:
-        """Return factors, motions and their derivatives; see `Shape`."""
+    def motions_turning(self, loads: Floats) -> tuple[Turning, Bools]:
+        """Return factors and motions with how these turn; see `Shape`."""
         motions, factors = self.solver.solve(loads)
-        _, gradients, hessians = self._derivatives(motions)
-        second, smooth = support_hessians(loads, motions, gradients, hessians)
-        return (factors, *unit_jacobians(motions, second), smooth)
+        free = ~(factors < np.inf)
+        if free.any():
+            # Nothing resists these motions, and they are the same for all loads nearby.
+            return self._turning_of_free(loads, motions, factors, free)
+        matrices, whole = of_support(loads, motions, self.dissipation)
+        return Turning(factors, motions, matrices, None), whole
 
-    def load_jacobians(self, motions: Floats) -> tuple[Floats, Floats, Bools]:
+    def _turning_of_free(
+        self, loads: Floats, motions: Floats, factors: Floats, free: Bools
+    ) -> tuple[Turning, Bools]:
+        matrices: Floats = np.zeros((6, loads.shape[1]))
+        smooth = free.copy()
+        held = np.flatnonzero(~free)
+        if len(held):
+            found, smooth[held] = self.motions_turning(loads.take(held, axis=1))
+            matrices[:, held] = found.matrices
+        return Turning(factors, motions, matrices, None), smooth
+
+    def loads_turning(self, motions: Floats) -> tuple[Floats, Floats, Bools]:
         """Return loads and their derivatives; see `Shape`."""
-        _, gradients, hessians = self._derivatives(motions)
-        return gradients, hessians, np.asarray(np.isfinite(hessians).all(axis=(0, 1)))
+        turning = self.dissipation.turning(motions)
+        return turning.normals, turning.matrices, _is_smooth(turning)
 
-    def _derivatives(self, motions: Floats) -> tuple[Floats, Floats, Floats]:
-        return self.dissipation.derivatives(motions, np.zeros(motions.shape[1]))
+    def motion_turning_scalar(self, load: Vector) -> tuple[float, Vector, Six] | None:
+        """Return the same for one load; see `Shape`."""
+        found = self.load_factor_and_motion_scalar(load)
+        if found is None or self._scalar is None:
+            return None
+        factor, motion = found
+        matrix = _of_support_scalar(self._scalar, load, motion)
+        return None if matrix is None else (factor, motion, matrix)
+
+    def load_turning_scalar(self, motion: Vector) -> tuple[Vector, Six] | None:
+        """Return the same for one motion; see `Shape`."""
+        found = None if self._scalar is None else self._scalar.turning(motion)
+        return None if found is None else found[1:]
 
     def expect(self, count: float) -> None:
         """Make what pays if so many vectors come at once; see `Shape`."""
         self.solver.expect(count)
+
+
+def _is_smooth(turning: Turning) -> Bools:
+    """Tell at which points no term has a kink, shape (m,)."""
+    if turning.kinks is None:
+        return np.ones(len(turning.values), dtype=bool)
+    return np.asarray(~turning.kinks.any(axis=0))
+
+
+def _of_support_scalar(gauge: ScalarGauge, normal: Vector, point: Vector) -> Six | None:
+    """Return the Hessian of a support function, whose point is known; None if it needs care."""
+    found = gauge.turning(point)
+    if found is None:
+        return _STILL if gauge.is_vertex(point) else None
+    return support_hessian(normal, point, found[1], found[2])

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from export_models import MODELS, SCALING, TRIANGLE, vectors
-from limit_surface_ros.surface import PointContacts, PowerSum, Scaling
+from limit_surface_ros.surface import Dissipation, PointContacts, PowerSum, Scaling
 
 W, V = SCALING.wrench_unit, SCALING.twist_unit
 RHO = SCALING.characteristic_length
@@ -130,3 +130,83 @@ def test_within_a_facet_the_motion_does_not_change():
     assert not jacobians.any()
     assert np.allclose(twists[0], twists[1])
     assert (TRIANGLE.load_factor_gradient(loads) * loads).sum(axis=1) == pytest.approx(1.0)
+
+
+ONES = np.eye(3)
+FLAT, THIN = np.diag([1.0, 2.0, 0.0]), np.diag([1.0, 0.0, 0.0])
+# Forms that do not see a load or a motion, with exponents of every range.
+KINKS = {
+    "blind, 1": (PowerSum([ONES, FLAT], [1.0, 1.0]), [0.0, 0.0, 1.0], True),
+    "blind, 1/2": (PowerSum([ONES, FLAT], [1.0, 0.5]), [0.0, 0.0, 1.0], False),
+    "blind, 2/3": (PowerSum([ONES, FLAT, ONES], [1.0, 2 / 3, 0.5]), [0.0, 0.0, 1.0], False),
+    "blind, 1/4": (PowerSum([ONES, ONES, FLAT], [1.0, 0.5, 0.25]), [0.0, 0.0, 1.0], False),
+    "norms": (PowerSum([ONES, FLAT], [0.5, 0.5]), [0.0, 0.0, 1.0], False),
+    "ridge of norms": (PowerSum([ONES, THIN], [0.5, 0.5]), [0.0, 0.5, 1.0], False),
+    "polynomial": (MODELS["polynomial"], [0.0, 0.0, 1.0], True),
+}
+
+
+@pytest.mark.parametrize("name", KINKS)
+def test_what_a_term_does_not_see_is_told_and_what_is_left_is_the_derivative(name):
+    surface, load, smooth = KINKS[name]
+    assert surface.is_smooth_at(load) == smooth
+    twist, jacobian = surface.twist_jacobian(load)
+    many = surface.twist_jacobian([load, load])[1]
+    assert np.allclose(many, jacobian, rtol=1e-12, atol=1e-14)
+    if smooth:
+        right = differences(surface.twist_of_wrench, np.array([load]), np.ones(3))[0]
+        assert np.allclose(jacobian, right, atol=1e-8)
+        return
+    # The same without the term, whose weight beside the others' is all that it changes.
+    others = [p for p in surface.exponents if p in (1.0, 0.5)]
+    rest = PowerSum([ONES] * len(others), others)
+    assert np.allclose(jacobian, rest.twist_jacobian(load)[1], atol=1e-12)
+    # A wrench that does not leave its corner or ridge does so with no motion nearby.
+    nearby = np.add(twist, [1e-3, 0.0, 0.0])
+    fixed = surface.wrench_jacobian(nearby)[1]
+    if name != "blind, 2/3":
+        assert np.abs(fixed[0]).max() < 1e-11
+    assert np.isfinite(fixed).all()
+
+
+def test_the_motion_stays_in_the_plane_of_a_term_of_rank_one():
+    # |v| + |omega|: a moment of less than the second norm does not turn the body.
+    surface = Dissipation([ONES, np.diag([0.0, 0.0, 1.0])])
+    load = [1.0, 0.5, 0.2]
+    twist, jacobian = surface.twist_jacobian(load)
+    plane = np.array([1.0, 0.5]) / np.hypot(1.0, 0.5)
+    assert np.allclose(twist, [*plane, 0.0], atol=1e-12)
+    across = (np.eye(2) - np.outer(plane, plane)) / np.hypot(1.0, 0.5)
+    assert np.allclose(jacobian[:2, :2], across, atol=1e-12)
+    assert np.abs(jacobian[2]).max() < 1e-11
+    assert surface.is_smooth_at(load)
+    assert not surface.wrench_is_smooth_at([1.0, 0.5, 0.0])
+    assert surface.wrench_is_smooth_at([1.0, 0.5, 0.1])
+
+
+def test_a_support_that_turns_freely_has_finite_derivatives():
+    surface = PointContacts([[0.1, 0.05]], [3.0], Scaling(0.1, 3.0))
+    for load, smooth in (([1.0, 0.0, 0.3], True), ([1.0, 0.0, -0.05], False)):
+        twist, jacobian = surface.twist_jacobian(load)
+        kappa, k = surface.quadratic_twist(load)
+        everything = (twist, jacobian, kappa, k, surface.load_factor_gradient(load))
+        assert all(np.isfinite(each).all() for each in everything)
+        assert surface.is_smooth_at(load) == smooth
+    assert not surface.wrench_is_smooth_at([0.05, -0.1, 1.0])
+    assert not surface.wrench_jacobian([0.05, -0.1, 1.0])[1].any()
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_one_vector_has_the_derivatives_of_many(name):
+    surface = MODELS[name]
+    asked = vectors(name, 60)
+    for given, method in (
+        (asked * [1.0, 1.0, RHO], surface.twist_jacobian),
+        (asked / [1.0, 1.0, RHO], surface.wrench_jacobian),
+    ):
+        values, jacobians = method(given)
+        each = [method(row) for row in given]
+        size = np.abs(jacobians).max(axis=(1, 2), keepdims=True)
+        assert np.allclose([value for value, _ in each], values, rtol=1e-9, atol=1e-12)
+        alone = np.array([jacobian for _, jacobian in each])
+        assert (np.abs(alone - jacobians) <= 1e-7 * size).all()

@@ -8,7 +8,7 @@ arrays of shape (3, m).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, NamedTuple, Protocol, runtime_checkable
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,8 +17,28 @@ if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
 
     Vector: TypeAlias = tuple[float, float, float]
+    # The entries xx, xy, xz, yy, yz and zz of a symmetric matrix.
+    Six: TypeAlias = tuple[float, float, float, float, float, float]
     # Height, gradient and Newton's move at a place in a plane.
     PlaneStep: TypeAlias = tuple[float, tuple[float, float], tuple[float, float]]
+
+
+class Turning(NamedTuple):
+    """A gauge's values at points x (3, m), with how the direction of its gradient turns there.
+
+    Attributes:
+        values: Shape (m,).
+        normals: N along the gradients, of any length, shape (3, m).
+        matrices: Symmetric K, as six rows xx, xy, xz, yy, yz and zz, shape (6, m): K x is along
+            N, and (1 - u u') K / |N| is the derivative of u = N / |N|.
+        kinks: Matrices (6, m) of the terms that turn at once, which `matrices` lack: of a trace
+            about one at a kink, zero elsewhere; None if there is no kink.
+    """
+
+    values: Floats
+    normals: Floats
+    matrices: Floats
+    kinks: Floats | None
 
 
 class FirstOrder(Protocol):
@@ -48,6 +68,15 @@ class Gauge(FirstOrder, Protocol):
         """
         ...
 
+    def turning(self, points: Floats, null: float = ..., /) -> Turning:
+        """Return values and normals at points (3, m), and how the normals turn.
+
+        Args:
+            points: Shape (3, m).
+            null: Norm of a term, relative to what it could be, up to which it is at its kink.
+        """
+        ...
+
 
 @runtime_checkable
 class BoundedGauge(Gauge, Protocol):
@@ -71,6 +100,14 @@ class ScalarGauge(Protocol):
 
     def value_and_normal(self, point: Vector, /) -> tuple[float, Vector] | None:
         """Return the value at a point, and a vector of any length along the gradient."""
+        ...
+
+    def turning(self, point: Vector, /) -> tuple[float, Vector, Six] | None:
+        """Return value, normal and how that turns, as `Turning` has them, at a point."""
+        ...
+
+    def is_vertex(self, point: Vector, /) -> bool:
+        """Tell whether a normal that is turned a little, any way, still is one of this point."""
         ...
 
     def in_plane(

@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Derivatives of a surface's maps, on scaled columns, from one gauge with its Hessian.
+"""Derivatives of a surface's maps, from one gauge with vectors along its gradient.
 
 The load factor g and the dissipation D are each the support function of the other's unit surface:
-g^2 / 2 and D^2 / 2 are conjugate (Rockafellar, Convex Analysis, section 15). The Hessian of the
-one at n, whose support point is x with m = grad and H = Hess of the other there, is therefore
+g^2 / 2 and D^2 / 2 are conjugate (Rockafellar, Convex Analysis, section 15). All derivatives
+follow from vectors N of any length along the gradient of the one, and from symmetric matrices K
+that say how N turns: K x is along N, and (1 - u u') K / |N| is the derivative of u = N / |N| by x.
+What K has along N does not matter.
 
-    |x|^2 [m] H [m]' / (n.x e2(H)),
+The Hessian of the other at n, whose support point is x, is
 
-[m] the cross product with m, e2 the sum of the principal minors of second order. Where the support
-point is a kink, as within a facet, it is zero: the answer does not change there.
+    (N.x / n.x) [n] K [n]' / (n' adj(K) n),
+
+[n] the cross product with n. It is zero within a facet, where K is infinite.
+
+Symmetric matrices are six rows, xx, xy, xz, yy, yz and zz.
 """
 
 from __future__ import annotations
@@ -17,56 +22,220 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limit_surface_ros.surface.linalg import squared_lengths
+
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Bools, Floats
+    from limit_surface_ros.surface.gauges.gauge import Gauge, Turning
 
-# Sine of the angle between a vector and the gradient at its support point from which this is a
-# kink, whose own term gives the rest of the vector.
-_KINK = 1e-7
-# e2 in parts of the trace's square below which a surface is flat in one direction.
-_FLAT = 1e-28
+# Product of the two curvatures of a surface, in parts of the square of their sum, below which it
+# is flat in one direction.
+FLAT = 1e-14
+# Turn of a support point with its normal, in parts of the usual, below which it is within a facet.
+FACET = 1e-9
+# Square of the sine of the angle between a normal and that of its point from which a kink is near,
+# and the norm of its term, relative to what it could be.
+PARALLEL = 1e-14
+_BESIDE = 1e-6
+# One over the curvature that stands for that of a kink.
+_SOFTNESS = 1e-12
+# Rows of a symmetric matrix as entries of its six.
+_ENTRIES = [[0, 1, 2], [1, 3, 4], [2, 4, 5]]
 
 
-def unit_jacobians(vectors: Floats, jacobians: Floats) -> tuple[Floats, Floats]:
-    """Return y / |y| and its derivative (1 - u u') J / |y| from those of y.
+def six_of(matrices: Floats) -> Floats:
+    """Return the six entries (6, k) of symmetric matrices (k, 3, 3)."""
+    return np.ascontiguousarray(matrices[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]].T)
+
+
+def take_outer(six: Floats, parts: Floats) -> None:
+    """Take the sums over k of p p' for vectors p in (3, k, m) from symmetric matrices (6, m)."""
+    x, y, z = parts
+    part = np.empty(parts.shape[2])
+    for row, (a, b) in zip(six, ((x, x), (x, y), (x, z), (y, y), (y, z), (z, z)), strict=True):
+        if len(a) == 1:
+            np.multiply(a[0], b[0], out=part)
+        else:
+            np.einsum("km,km->m", a, b, out=part)
+        row -= part
+
+
+def sum_of_terms(parts: Floats) -> Floats:
+    """Return the sums over k (3, m) of parts (3, k, m)."""
+    # Few long rows: quicker than numpy's own sum along the middle.
+    sums: Floats = parts[:, 0].copy()
+    for term in range(1, parts.shape[1]):
+        sums += parts[:, term]
+    return sums
+
+
+def products(six: Floats, vectors: Floats) -> Floats:
+    """Return K x (3, m) for K in six rows (6, m) and x (3, m)."""
+    result = np.empty_like(vectors)
+    part = np.empty(vectors.shape[1])
+    for row, entries in zip(result, _ENTRIES, strict=True):
+        np.multiply(six[entries[0]], vectors[0], out=row)
+        for entry, vector in zip(entries[1:], vectors[1:], strict=True):
+            np.multiply(six[entry], vector, out=part)
+            row += part
+    return result
+
+
+def direction_jacobians(
+    normals: Floats, six: Floats, sizes: Floats, units: Floats
+) -> tuple[Floats, Floats]:
+    """Return u = N / |N| (3, m) and its derivatives (3, 3, m).
 
     Args:
-        vectors: y, shape (3, m).
-        jacobians: J of y, shape (3, 3, m).
+        normals: N, shape (3, m).
+        six: K, shape (6, m).
+        sizes: What the derivatives are divided by, shape (m,).
+        units: What each entry is multiplied by, shape (3, 3).
     """
-    length = np.sqrt((vectors * vectors).sum(axis=0))
-    unit = vectors / length
-    along = np.einsum("im,ijm->jm", unit, jacobians)
-    across = jacobians - unit[:, np.newaxis] * along
-    across /= length
-    return unit, across
+    scale = 1.0 / np.sqrt(np.einsum("im,im->m", normals, normals))
+    unit = normals * scale
+    scale /= sizes
+    six = six * scale
+    along = products(six, unit)
+    jacobians = np.empty((3, 3, normals.shape[1]))
+    part = np.empty_like(scale)
+    for row, entries, component in zip(jacobians, _ENTRIES, unit, strict=True):
+        for place, entry, of_column in zip(row, entries, along, strict=True):
+            np.multiply(component, of_column, out=part)
+            np.subtract(six[entry], part, out=place)
+    jacobians *= units[:, :, np.newaxis]
+    return unit, jacobians
 
 
-def support_hessians(
-    normals: Floats, points: Floats, gradients: Floats, hessians: Floats
-) -> tuple[Floats, Bools]:
-    """Return the Hessians (3, 3, m) of a support function, and where it is smooth (m,).
+def gradients_and_hessians(points: Floats, turning: Turning) -> tuple[Floats, Floats]:
+    """Return g grad g (3, m), and its derivatives (6, m) by x: grad g grad g' + g Hess g.
+
+    Args:
+        points: x, shape (3, m).
+        turning: Of the gauge there; where its value is infinite, all is zero.
+    """
+    values, normals, six, _ = turning
+    values = np.where(values < np.inf, values, 0.0)
+    along = np.einsum("im,im->m", normals, points)
+    # grad g = scale N, and Hess g = scale (K - part N N') with Hess g x = 0.
+    scale = values / along
+    part = np.einsum("im,im->m", products(six, points), points) / (along * along)
+    weight = values * scale
+    outer = scale * scale - weight * part
+    hessians = six * weight
+    x, y, z = normals
+    for row, (a, b) in zip(
+        hessians, ((x, x), (x, y), (x, z), (y, y), (y, z), (z, z)), strict=True
+    ):
+        row += outer * (a * b)
+    return normals * weight, hessians
+
+
+def of_support(normals: Floats, points: Floats, gauge: Gauge) -> tuple[Floats, Bools]:
+    """Return the Hessians (6, m) of a support function, and where they are whole (m,).
+
+    Where a surface is flat in one direction, the Hessian is infinite in that, and what is returned
+    is the rest.
 
     Args:
         normals: n, shape (3, m).
         points: Their support points x on the unit surface of a gauge, shape (3, m).
-        gradients: Of the gauge at the points; what is at a kink adds nothing; shape (3, m).
-        hessians: Of the gauge there, shape (3, 3, m).
+        gauge: The gauge.
     """
-    (a, b, c), (_, d, e), (_, _, f) = hessians
-    minors = a * d - b * b + a * f - c * c + d * f - e * e
-    trace = a + d + f
-    power = (normals * points).sum(axis=0)
-    size = np.sqrt((normals * normals).sum(axis=0))
-    # On a smooth place n is along the gradient: n = (n.x) m.
-    off = normals - power * gradients
-    kink = np.sqrt((off * off).sum(axis=0)) > _KINK * size
-    flat = ~(minors > _FLAT * trace * trace)
-    usable = ~(kink | flat)
-    square = (points * points).sum(axis=0)
-    factor = np.where(usable, square / np.where(usable, power * minors, 1.0), 0.0)
-    x, y, z = gradients
-    zero = np.zeros_like(x)
-    cross = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]])
-    half = np.einsum("ikm,klm->ilm", cross, hessians)
-    return np.einsum("ilm,jlm->ijm", half, cross) * factor, ~flat
+    turning = gauge.turning(points)
+    found, whole = _of_turning(normals, points, turning)
+    # A normal that is not that of its point is one of many at a kink, which is not quite met.
+    along = np.einsum("im,im->m", normals, points)
+    along /= np.einsum("im,im->m", turning.normals, points)
+    off = turning.normals * along
+    off -= normals
+    beside = np.einsum("im,im->m", off, off) > PARALLEL * squared_lengths(normals)
+    if beside.any():
+        at = np.flatnonzero(beside)
+        normals, points = normals.take(at, axis=1), points.take(at, axis=1)
+        found[:, at], whole[at] = _of_turning(normals, points, gauge.turning(points, _BESIDE))
+    return found, whole
+
+
+def _of_turning(normals: Floats, points: Floats, turning: Turning) -> tuple[Floats, Bools]:
+    six = turning.matrices
+    if turning.kinks is not None:
+        # As large as still leaves digits to the other direction.
+        sizes = squared_lengths(turning.normals) / squared_lengths(points)
+        six = six + turning.kinks * (np.sqrt(sizes) / _SOFTNESS)
+    return support_hessians(normals, points, turning.normals, six)
+
+
+def support_hessians(
+    normals: Floats, points: Floats, gauge_normals: Floats, six: Floats
+) -> tuple[Floats, Bools]:
+    """Return what `of_support` does, from finite matrices.
+
+    Args:
+        normals: n, shape (3, m).
+        points: Their support points x on the unit surface of a gauge, shape (3, m).
+        gauge_normals: N of the gauge there, shape (3, m).
+        six: K of the gauge there, shape (6, m).
+    """
+    found = _twice_crossed(normals, six)
+    # K : [n] K [n]' = 2 n' adj(K) n.
+    minors = np.einsum("im,im->m", six, found)
+    minors += six[1] * found[1]
+    minors += six[2] * found[2]
+    minors += six[4] * found[4]
+    minors *= 0.5
+    sums = found[0] + found[3]
+    sums += found[5]
+    square = squared_lengths(normals)
+    powers = np.einsum("im,im->m", normals, points)
+    factors = np.einsum("im,im->m", gauge_normals, points)
+    factors /= powers
+    # The sum of the curvatures is tr([n] K [n]') / |n|^2, their product n' adj(K) n / |n|^2.
+    flat = ~(minors * square > FLAT * sums * sums)
+    if flat.any():
+        minors[flat] = np.inf
+    factors /= minors
+    found *= factors
+    if flat.any():
+        at = np.flatnonzero(flat)
+        scale = np.einsum("im,im->m", gauge_normals[:, at], points[:, at]) / powers[at]
+        found[:, at] = scale * _rest_of_flat(normals[:, at], six[:, at])
+    # A support point that all but stays where it is, as in a facet, is told to stay.
+    turn = found[0] + found[3]
+    turn += found[5]
+    turn *= powers
+    still = np.abs(turn) <= FACET * squared_lengths(points)
+    if still.any():
+        found[:, still] = 0.0
+    return found, ~flat
+
+
+def _twice_crossed(normals: Floats, six: Floats) -> Floats:
+    """Return [n] K [n]' in six rows (6, m)."""
+    x, y, z = normals
+    a, b, c, d, e, f = six
+    # The rows of [n] K, each entry that is needed.
+    first_y, first_z = y * e - z * d, y * f - z * e
+    second_x, second_z = z * a - x * c, z * c - x * f
+    third_x, third_y = x * b - y * a, x * d - y * b
+    first_x, second_y = y * c - z * b, z * b - x * e
+    found = np.empty_like(six)
+    np.subtract(y * first_z, z * first_y, out=found[0])
+    np.subtract(z * first_x, x * first_z, out=found[1])
+    np.subtract(x * first_y, y * first_x, out=found[2])
+    np.subtract(z * second_x, x * second_z, out=found[3])
+    np.subtract(x * second_y, y * second_x, out=found[4])
+    np.subtract(x * third_y, y * third_x, out=found[5])
+    return found
+
+
+def _rest_of_flat(normals: Floats, six: Floats) -> Floats:
+    """Return the inverses of K across n in six rows, without what is infinite, for few columns."""
+    found = np.empty_like(six)
+    for column, (normal, entries) in enumerate(zip(normals.T, six.T, strict=True)):
+        basis = np.linalg.svd(normal[np.newaxis])[2][1:]
+        values, vectors = np.linalg.eigh(basis @ entries[_ENTRIES] @ basis.T)
+        inverse = 1.0 / values[1] if values[1] > 0.0 else 0.0
+        vector = vectors[:, 1] @ basis
+        found[:, column] = six_of((inverse * np.outer(vector, vector))[np.newaxis])[:, 0]
+    return found

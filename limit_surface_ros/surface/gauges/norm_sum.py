@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from limit_surface_ros.surface.gauges.corners import Corners
-from limit_surface_ros.surface.gauges.gauge import Gauge
+from limit_surface_ros.surface.gauges.gauge import Gauge, Turning
+from limit_surface_ros.surface.gauges.jacobians import six_of, sum_of_terms, take_outer
 from limit_surface_ros.surface.linalg import squared_lengths
 
 if TYPE_CHECKING:
@@ -48,6 +49,9 @@ class NormSum:
         # A matrix of full rank, as `root_of` tells it, has no kink.
         self._has_kinks = not np.abs(roots).any(axis=2).all()
         self._least = KINK * self._sizes[:, np.newaxis]
+        # All that takes points to the gradients' parts, component by component, and the forms.
+        self._stacked_forms = self._forms.swapaxes(0, 1).reshape(-1, 3)
+        self._six = six_of(self._forms)
 
     def values_and_normals(self, points: Floats) -> tuple[Floats, Floats]:
         """Return the sum (m,) and its gradient (3, m); a norm at its kink is zero in both."""
@@ -90,6 +94,32 @@ class NormSum:
             hessian += (form[:, :, np.newaxis] - part[:, np.newaxis] * part) / norm
         return total, gradient, hessian
 
+    def turning(self, points: Floats, null: float = KINK) -> Turning:
+        """Return values, gradients and Hessians; see `Gauge`."""
+        columns = points.shape[1]
+        images = self._stacked_roots.dot(points).reshape(-1, 3, columns)
+        norms = np.sqrt(np.einsum("kcm,kcm->km", images, images))
+        values, kinks = None, None
+        if self._has_kinks:
+            at_kink = norms <= null * np.outer(self._sizes, np.sqrt(squared_lengths(points)))
+            if at_kink.any():
+                norms[at_kink] = 0.0
+                values = np.add.reduce(norms)
+                norms[at_kink] = np.inf
+                kinks = (self._six / np.square(self._sizes)).dot(at_kink)
+        if values is None:
+            values = np.add.reduce(norms)
+        weights = np.divide(1.0, norms, out=norms)
+        # In the place of the images, which have served.
+        parts = self._stacked_forms.dot(points, out=images.reshape(-1, columns))
+        parts = parts.reshape(3, -1, columns)
+        parts *= weights
+        matrices = self._six.dot(weights)
+        normals = sum_of_terms(parts)
+        parts *= np.sqrt(weights, out=weights)
+        take_outer(matrices, parts)
+        return Turning(values, normals, matrices, kinks)
+
     def corners(self) -> Corners | None:
         """Return the zeros of each norm of rank two that are no other norm's."""
         flat = np.abs(self._roots).any(axis=2).sum(axis=1) == 2
@@ -123,6 +153,14 @@ class PointNormSum:
         self._along_moments = limits * np.array([ones, y, y * y])
         self._beside_moments = limits * np.array([ones, x, x * x])
         self._cross_moments = limits * np.array([ones, x, y, x * y])
+        # The six entries of each point's Hessian by its velocity's ey^2, ex^2 and ex ey / speed.
+        self._turns = limits * np.array(
+            [
+                [ones, zeros, -y, zeros, zeros, y * y],
+                [zeros, zeros, zeros, ones, x, x * x],
+                [zeros, -ones, -x, zeros, y, 2.0 * x * y],
+            ]
+        ).transpose(1, 0, 2)
 
     def _loads(self, part: slice, twists: Floats) -> Floats:
         """Return what some of the points add to the gradient."""
@@ -188,6 +226,38 @@ class PointNormSum:
         hessian[1, 0], hessian[2, 0], hessian[2, 1] = hessian[0, 1], hessian[0, 2], hessian[1, 2]
         return total, gradient, hessian
 
+    def turning(self, twists: Floats, null: float = KINK) -> Turning:
+        """Return D, its gradient and its Hessian; see `Gauge`."""
+        columns = twists.shape[1]
+        gradient: Floats = np.zeros_like(twists)
+        hessian: Floats = np.zeros((6, columns))
+        kinks: Floats | None = None
+        for part in self._parts(columns):
+            velocities = (self._jacobians[:, part].reshape(-1, 3) @ twists).reshape(2, -1, columns)
+            ex, ey = velocities
+            speeds = self._speeds(ex, ey, twists, null=null)
+            at_rest = np.isinf(speeds)
+            if at_rest.any():
+                found = self._forms_at_rest(part) @ at_rest
+                kinks = found if kinks is None else kinks + found
+            slowness = np.divide(1.0, speeds, out=speeds)
+            velocities *= slowness
+            gradient += self._unit_loads[:, :, part].reshape(3, -1) @ velocities.reshape(
+                -1, columns
+            )
+            weights = np.empty((3, *ex.shape))
+            np.multiply(ey, ey, out=weights[0])
+            np.multiply(ex, ex, out=weights[1])
+            np.multiply(ex, ey, out=weights[2])
+            weights *= slowness
+            hessian += self._turns[:, :, part].reshape(6, -1) @ weights.reshape(-1, columns)
+        return Turning(np.einsum("im,im->m", gradient, twists), gradient, hessian, kinks)
+
+    def _forms_at_rest(self, part: slice) -> Floats:
+        """Return J_k'J_k of some points, divided by their traces, as six rows (6, k)."""
+        forms = self._turns[:, 0, part] + self._turns[:, 1, part]
+        return np.asarray(forms / (forms[0] + forms[3] + forms[5]))
+
     def roots(self) -> Floats:
         """Return R_k with |R_k v| = m_k |w_k|, shape (n, 3, 3); the last row of each is zero."""
         roots = np.zeros((len(self.limits), 3, 3))
@@ -216,7 +286,12 @@ class PointNormSum:
         return vx - omega * self._y[part], vy + omega * self._x[part]
 
     def _speeds(
-        self, wx: Floats, wy: Floats, twists: Floats, softness: Floats | None = None
+        self,
+        wx: Floats,
+        wy: Floats,
+        twists: Floats,
+        softness: Floats | None = None,
+        null: float = KINK,
     ) -> Floats:
         """Return speeds, infinite for points at rest so that they add nothing."""
         speed = wx * wx
@@ -224,7 +299,7 @@ class PointNormSum:
         if softness is not None:
             speed += softness
         size = np.abs(twists)
-        least = KINK * self._reach
+        least = null * self._reach
         # The least of all speeds is cheaper than one bound for each, and is most often enough.
         if speed.min(initial=np.inf) <= (least * size.max(initial=0.0)) ** 2:
             speed[speed <= np.square(least * size.max(axis=0))] = np.inf

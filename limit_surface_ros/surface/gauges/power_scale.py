@@ -29,7 +29,8 @@ class PowerScale(Protocol):
     def load_factors_and_weights(self, forms: Floats) -> tuple[Floats, Floats]:
         """Return g (m,), and weights (k, m) of the A_i f in a normal of any length.
 
-        The weight of a form that is zero is of no account, and finite.
+        The weight of a form that is zero is finite: with the exponent 1 what it is beside that
+        place, 0 with lower ones, which have a kink or worse there.
         """
         ...
 
@@ -95,7 +96,14 @@ class LogarithmicScale:
         """Return g (m,) and weights p_i h_i / q_i, shape (k, m)."""
         t, weights = self._scales_and_shares(forms)
         weights *= self._exponents[:, np.newaxis]
-        weights /= np.where(forms > 0.0, forms, np.inf)
+        null = forms == 0.0
+        if null.any():
+            weights /= np.where(null, np.inf, forms)
+            # With the exponent 1 a weight is the same wherever its form goes.
+            null &= (self._exponents == 1.0)[:, np.newaxis] & (t < np.inf)
+            weights[null] = np.broadcast_to(np.exp(2.0 * t), null.shape)[null]
+        else:
+            weights /= forms
         return np.exp(-t), weights
 
     def _scales_and_shares(self, forms: Floats) -> tuple[Floats, Floats]:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.surface.gauges.corners import Corners
+from limit_surface_ros.surface.gauges.gauge import Turning
+from limit_surface_ros.surface.gauges.jacobians import six_of, sum_of_terms, take_outer
 from limit_surface_ros.surface.gauges.power_scale import power_scale
 from limit_surface_ros.surface.linalg import NULL_TOLERANCE, solve_symmetric, squared_lengths
 
@@ -29,6 +31,14 @@ class PowerSumGauge:
         # A matrix of full rank, as `root_of` tells it, has no null space.
         full = np.abs(roots).any(axis=2).all()
         self._null = None if full else NULL_TOLERANCE * self._sizes
+        # All that takes loads to the A_i f, component by component, and the forms.
+        self._stacked_forms = self._forms.swapaxes(0, 1).reshape(-1, 3)
+        self._six = six_of(self._forms)
+        # Terms that are no quadratic forms: the last in the order of files, where a slice will do
+        # that copies nothing.
+        rooted = exponents < 1.0
+        first = len(exponents) - np.count_nonzero(rooted)
+        self._curved = slice(first, None) if rooted[first:].all() else np.flatnonzero(rooted)
 
     def values(self, loads: Floats) -> Floats:
         """Return g (m,); 0 for a load that nothing limits."""
@@ -87,6 +97,42 @@ class PowerSumGauge:
         hessian /= total
         hessian += (second_total / total + 1.0) * gradient[:, np.newaxis] * gradient
         return gauge, gauge * gradient, gauge * hessian
+
+    def turning(self, loads: Floats, null: float | None = None) -> Turning:
+        """Return values, normals and how these turn; see `Gauge`.
+
+        With weights w_i of the A_i f in the normal, its derivative is sum_i w_i A_i, which takes
+        f to N, less 2 (1 - p_i) w_i / q_i A_i f (A_i f)', but for parts along N. With
+        A_i f - (q_i / N.f) N instead of A_i f, which are zero along f, the latter take f to zero.
+        """
+        columns = loads.shape[1]
+        images, forms = self.images_and_forms(loads)
+        if null is not None and self._null is not None:
+            forms[forms <= null * null * self._sizes * squared_lengths(loads)] = 0.0
+        values, weights = self._scale.load_factors_and_weights(forms)
+        # In the place of the images, which have served.
+        parts = self._stacked_forms.dot(loads, out=images.reshape(-1, columns))
+        parts = parts.reshape(3, -1, columns)
+        matrices = self._six.dot(weights)
+        parts *= weights
+        normals = sum_of_terms(parts)
+        curved, kinks = self._curved, None
+        forms = forms[curved]
+        if len(forms):
+            # The parts are times w_i already.
+            forms *= weights[curved]
+            parts = parts[:, curved]
+            parts -= forms / np.einsum("im,im->m", normals, loads) * normals[:, np.newaxis]
+            if self._null is not None:
+                at_kink = forms == 0.0
+                if at_kink.any():
+                    kinks = (self._six / self._sizes.T)[:, curved].dot(at_kink)
+                    # Their parts are zero.
+                    forms[at_kink] = 1.0
+            forms /= 2.0 - 2.0 * self._exponents[curved, np.newaxis]
+            parts /= np.sqrt(forms, out=forms)
+            take_outer(matrices, parts)
+        return Turning(values, normals, matrices, kinks)
 
     def ellipsoids(self, loads: Floats) -> Floats:
         """Return P (m, 3, 3): ellipsoids f' P^-1 f = 1 within the surface, touching it.

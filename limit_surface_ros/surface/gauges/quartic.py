@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limit_surface_ros.surface.gauges.gauge import Turning
+from limit_surface_ros.surface.gauges.jacobians import six_of
+
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
 
@@ -52,6 +55,8 @@ class Quartic:
         self._coefficients = coefficients
         self.second = _second_derivatives(coefficients)
         self.first = _first_derivatives(self.second)
+        # Its six rows of symmetric matrices, shape (6, 6).
+        self._second_rows = six_of(np.moveaxis(self.second, 2, 0))
 
     def in_frame(self, frame: Floats) -> Quartic:
         """Return the polynomial of y with f = F y."""
@@ -74,8 +79,10 @@ class Quartic:
 
     def gradient(self, loads: Floats) -> Floats:
         """Return the gradient (3, m) of P at loads (3, m)."""
+        return self._gradient(loads, _quadratics(loads))
+
+    def _gradient(self, loads: Floats, quadratics: Floats) -> Floats:
         x, y, m = loads
-        quadratics = _quadratics(loads)
         cubics = np.empty((10, loads.shape[1]))
         np.multiply(quadratics, x, out=cubics[:6])
         np.multiply(quadratics[3:], y, out=cubics[6:9])
@@ -106,6 +113,13 @@ class Quartic:
         """Return P^(1/4) (m,) and the gradient of P (3, m)."""
         gradient = self.gradient(loads)
         return np.sqrt(np.sqrt(_by_euler(loads, gradient))), gradient
+
+    def turning(self, loads: Floats, _null: float = 0.0) -> Turning:
+        """Return P^(1/4) with the gradient and the Hessian of P; see `Gauge`."""
+        quadratics = _quadratics(loads)
+        gradient = self._gradient(loads, quadratics)
+        value = np.sqrt(np.sqrt(_by_euler(loads, gradient)))
+        return Turning(value, gradient, self._second_rows @ quadratics, None)
 
     def derivatives(self, loads: Floats, _smoothing: Floats) -> tuple[Floats, Floats, Floats]:
         """Return P^(1/4) with its gradient and Hessian; see `Gauge`. There are no kinks."""

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limit_surface_ros.surface.gauges.jacobians import six_of
+from limit_surface_ros.surface.gauges.scalar_jacobians import without_turning
 from limit_surface_ros.surface.linalg import NULL_TOLERANCE
 
 if TYPE_CHECKING:
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
     from typing import TypeAlias
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.gauges.gauge import PlaneStep, Vector
+    from limit_surface_ros.surface.gauges.gauge import PlaneStep, Six, Vector
 
     # The square of a norm below which a unit vector is in its null space, and R row by row.
     Norm: TypeAlias = tuple[float, ...]
@@ -40,6 +42,8 @@ class NormSumScalar:
     def __init__(self, roots: Floats) -> None:
         """Keep the R_k, shape (k, 3, 3)."""
         self._norms = _norms(roots)
+        self._forms = _forms(roots)
+        self._vertices = _vertices(self._norms, roots)
 
     def value(self, point: Vector) -> float:
         """Return the sum; the norm of a point in its null space is exactly zero."""
@@ -72,6 +76,39 @@ class NormSumScalar:
             gy += s * (b * u + e * v + h * w)
             gz += s * (c * u + f * v + i * w)
         return gx * x + gy * y + gz * z, (gx, gy, gz)
+
+    def turning(self, point: Vector) -> tuple[float, Vector, Six] | None:
+        """Return the sum, its gradient and its Hessian."""
+        x, y, z = point
+        gx = gy = gz = xx = xy = xz = yy = yz = zz = 0.0
+        size = x * x + y * y + z * z
+        for (least, a, b, c, d, e, f, g, h, i), (axx, axy, axz, ayy, ayz, azz) in zip(
+            self._norms, self._forms, strict=True
+        ):
+            u = a * x + b * y + c * z
+            v = d * x + e * y + f * z
+            w = g * x + h * y + i * z
+            q = u * u + v * v + w * w
+            if not least * size < q:
+                return None
+            s = 1.0 / sqrt(q)
+            px = s * (a * u + d * v + g * w)
+            py = s * (b * u + e * v + h * w)
+            pz = s * (c * u + f * v + i * w)
+            gx += px
+            gy += py
+            gz += pz
+            xx += s * (axx - px * px)
+            xy += s * (axy - px * py)
+            xz += s * (axz - px * pz)
+            yy += s * (ayy - py * py)
+            yz += s * (ayz - py * pz)
+            zz += s * (azz - pz * pz)
+        return gx * x + gy * y + gz * z, (gx, gy, gz), (xx, xy, xz, yy, yz, zz)
+
+    def is_vertex(self, point: Vector) -> bool:
+        """Tell whether the norm of a matrix of rank two is zero; see `ScalarGauge`."""
+        return _is_null(self._vertices, point)
 
     def in_plane(
         self, normal: Vector, first: Vector, second: Vector
@@ -108,6 +145,11 @@ class PowerSumScalar:
     def __init__(self, roots: Floats, exponents: Floats) -> None:
         """Keep R_i, shape (k, 3, 3), and p_i, shape (k,)."""
         self._norms = _norms(roots)
+        self._forms_of_terms = _forms(roots)
+        self._vertices = _vertices(
+            [norm for norm, p in zip(self._norms, exponents, strict=True) if p < 1.0],
+            roots[exponents < 1.0],
+        )
         self._exponents: list[float] = exponents.tolist()
 
     def value(self, point: Vector) -> float | None:
@@ -135,6 +177,38 @@ class PowerSumScalar:
             gy += b * u + e * v + h * w
             gz += c * u + f * v + i * w
         return exp(-t), (gx, gy, gz)
+
+    def turning(self, point: Vector) -> tuple[float, Vector, Six] | None:
+        """Return the load factor with a normal and how it turns; see `PowerSumGauge.turning`."""
+        values = self._forms(point)
+        t = None if values is None else self._log_scale(values)
+        if values is None or t is None:
+            return None
+        x, y, z = point
+        gx = gy = gz = xx = xy = xz = yy = yz = zz = 0.0
+        for (axx, axy, axz, ayy, ayz, azz), value, p in zip(
+            self._forms_of_terms, values, self._exponents, strict=True
+        ):
+            s = p * exp(p * (log(value) + 2.0 * t)) / value
+            px = axx * x + axy * y + axz * z
+            py = axy * x + ayy * y + ayz * z
+            pz = axz * x + ayz * y + azz * z
+            gx += s * px
+            gy += s * py
+            gz += s * pz
+            r = (2.0 - 2.0 * p) / value
+            xx += s * (axx - r * px * px)
+            xy += s * (axy - r * px * py)
+            xz += s * (axz - r * px * pz)
+            yy += s * (ayy - r * py * py)
+            yz += s * (ayz - r * py * pz)
+            zz += s * (azz - r * pz * pz)
+        normal = (gx, gy, gz)
+        return exp(-t), normal, without_turning((xx, xy, xz, yy, yz, zz), point, normal)
+
+    def is_vertex(self, point: Vector) -> bool:
+        """Tell whether a rooted form of rank two is zero; see `ScalarGauge`."""
+        return _is_null(self._vertices, point)
 
     def in_plane(
         self, normal: Vector, first: Vector, second: Vector
@@ -229,6 +303,19 @@ class QuarticScalar:
         """Return the load factor."""
         return self.value_and_normal(point)[0]
 
+    def turning(self, point: Vector) -> tuple[float, Vector, Six]:
+        """Return the load factor, the gradient and the Hessian of P; see `ScalarGauge`."""
+        value, normal = self.value_and_normal(point)
+        size = abs(point[0]) + abs(point[1]) + abs(point[2])
+        x, y, m = point[0] / size, point[1] / size, point[2] / size
+        squares = (x * x, x * y, x * m, y * y, y * m, m * m)
+        xx, xy, xm, yy, ym, mm = (sum(map(mul, row, squares)) / size for row in self._hessian_rows)
+        return value, normal, (xx, xy, xm, yy, ym, mm)
+
+    def is_vertex(self, _point: Vector) -> bool:
+        """Tell that there is no kink; see `ScalarGauge`."""
+        return False
+
     def value_and_normal(self, point: Vector) -> tuple[float, Vector]:
         """Return the load factor, and the gradient of P at the point over its size."""
         size = abs(point[0]) + abs(point[1]) + abs(point[2])
@@ -299,6 +386,31 @@ def _norms(roots: Floats) -> list[Norm]:
     rows = roots.reshape(-1, 9)
     least = NULL_TOLERANCE * np.square(rows).sum(axis=1)
     return [(small, *row) for small, row in zip(least.tolist(), rows.tolist(), strict=True)]
+
+
+def _forms(roots: Floats) -> list[Six]:
+    """Return R'R of each."""
+    rows = six_of(np.swapaxes(roots, 1, 2) @ roots).T.tolist()
+    return [(xx, xy, xz, yy, yz, zz) for xx, xy, xz, yy, yz, zz in rows]
+
+
+def _vertices(norms: list[Norm], roots: Floats) -> list[Norm]:
+    """Return those of rank two."""
+    ranks = np.abs(roots).any(axis=2).sum(axis=1)
+    return [norm for norm, rank in zip(norms, ranks, strict=True) if rank == 2]
+
+
+def _is_null(norms: list[Norm], point: Vector) -> bool:
+    """Tell whether one of some norms is zero, but for rounding."""
+    x, y, z = point
+    size = x * x + y * y + z * z
+    for least, a, b, c, d, e, f, g, h, i in norms:
+        u = a * x + b * y + c * z
+        v = d * x + e * y + f * z
+        w = g * x + h * y + i * z
+        if u * u + v * v + w * w <= least * size:
+            return True
+    return False
 
 
 def _in_plane(norm: Norm, normal: Vector, first: Vector, second: Vector) -> PlaneForm:

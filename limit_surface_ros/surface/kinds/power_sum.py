@@ -14,6 +14,7 @@ from limit_surface_ros.errors import RangeError, ShapeError
 from limit_surface_ros.surface.base import FileArray, LimitSurface
 from limit_surface_ros.surface.gauges.power_scale import power_scale
 from limit_surface_ros.surface.gauges.power_sum import PowerSumGauge
+from limit_surface_ros.surface.kinds.ellipsoid import EllipsoidShape
 from limit_surface_ros.surface.linalg import as_psd_matrices, null_space, of_unit_length, root_of
 from limit_surface_ros.surface.scaling import Scaling
 from limit_surface_ros.surface.shape import GaugeShape
@@ -27,8 +28,8 @@ from limit_surface_ros.surface.support.power_sum_solver import (
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.gauges.gauge import Vector
+    from limit_surface_ros.checks import Bools, Floats
+    from limit_surface_ros.surface.gauges.gauge import Six, Turning, Vector
     from limit_surface_ros.surface.support.solvers import SupportSolver
 
 # Part of a motion along a load without limit, above which its power is infinite.
@@ -196,8 +197,19 @@ class PowerSum(LimitSurface):
     def _terms(self) -> PowerSumGauge:
         return PowerSumGauge(self._roots, self.exponents)
 
-    def _new_shape(self) -> _PowerSumShape:
+    def _new_shape(self) -> EllipsoidShape | _PowerSumShape:
+        if len(self._roots) == 1 and len(null_space(self._roots)) == 0:
+            return EllipsoidShape(self._roots[0])
         return _PowerSumShape(self._roots, self.exponents)
+
+
+def _check_limited(loads: Floats, factors: Floats) -> None:
+    if np.count_nonzero(factors) < len(factors):
+        unlimited = loads[:, factors == 0.0][:, 0].tolist()
+        raise RangeError(
+            "this surface has no limit in the direction of a wrench: friction resists any "
+            f"amount of it, scaled direction {unlimited}"
+        )
 
 
 class _PowerSumShape(GaugeShape):
@@ -215,13 +227,22 @@ class _PowerSumShape(GaugeShape):
             RangeError: Nothing limits a load.
         """
         factors, normals = self._gauge.values_and_normals(loads)
-        if np.count_nonzero(factors) < len(factors):
-            unlimited = loads[:, factors == 0.0][:, 0].tolist()
-            raise RangeError(
-                "this surface has no limit in the direction of a wrench: friction resists any "
-                f"amount of it, scaled direction {unlimited}"
-            )
+        _check_limited(loads, factors)
         return of_unit_length(normals), factors
+
+    def motions_turning(self, loads: Floats) -> tuple[Turning, Bools]:
+        """Return factors and motions with how these turn; see `Shape`.
+
+        Raises:
+            RangeError: Nothing limits a load.
+        """
+        if len(self._free):
+            _check_limited(loads, self.load_factors(loads))
+        return super().motions_turning(loads)
+
+    def load_turning_scalar(self, motion: Vector) -> tuple[Vector, Six] | None:
+        """Return the same for one motion; see `Shape`."""
+        return None if len(self._free) else super().load_turning_scalar(motion)
 
     def load_factor_and_motion_scalar(self, load: Vector) -> tuple[float, Vector] | None:
         """Return load factor and motion of one load; see `Shape`."""
