@@ -4,17 +4,18 @@
 Usage: python benchmarks/bench_services.py
 
 The nodes run in processes of their own, with the default executor; the calls alternate between
-them. Also measured: each kind of model, 1, 4 and 16 clients, the topic path, and processor time.
-The lists are of unequal length: an empty handler lists nothing.
+them. Also measured: each kind of model, and each under another weight; 1, 4 and 16 clients, the
+topic path, and processor time. The lists are of unequal length: an empty handler lists nothing.
 """
 
 from __future__ import annotations
 
+import contextlib
 import tempfile
 import threading
 import time
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from bench_maps import kinds
@@ -47,6 +48,9 @@ from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_mod
 from limit_surface_ros.nodes.clients.service_client import ServiceClient
 from limit_surface_ros.nodes.messages import convert
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
 SINGLE_CALLS = 1500
 BATCH_CALLS = 100
 KIND_CALLS = 300
@@ -71,6 +75,9 @@ KINDS = {
 }
 SINGLE_GOAL = 1.15
 BATCH_GOAL = 2.5
+WEIGHT_GOAL = 1.2
+# What presses the bodies of the models [N], and what a parameter or a wrench says of it.
+NORMAL_FORCE, OTHER_FORCE = 2.0, 3.0
 NODES = {"ours": "/limit_surface", "empty": "/bare"}
 
 
@@ -142,9 +149,13 @@ class Call(NamedTuple):
 
     def times(self, client: ServiceClient) -> tuple[list[float], list[float]]:
         """Return times [s] of ours and of the empty handler, called in turns."""
+        bare = "list_decays" if KINDS[type(self.request)] is ListDecays else self.service
+        return self.times_beside(client, f"/bare/{bare}")
+
+    def times_beside(self, client: ServiceClient, other: str) -> tuple[list[float], list[float]]:
+        """Return times [s] of ours and of another service of its type, called in turns."""
         kind = KINDS[type(self.request)]
-        bare = "list_decays" if kind is ListDecays else self.service
-        names = f"{self.node}/{self.service}", f"/bare/{bare}"
+        names = f"{self.node}/{self.service}", other
         found: tuple[list[float], list[float]] = [], []
         for turn in range(20 + self.repeats):
             for name, elapsed in zip(names, found, strict=True):
@@ -173,27 +184,71 @@ def service_rows(client: ServiceClient) -> None:
         )
 
 
-def kind_rows(client: ServiceClient) -> None:
-    """Print round trips on a model of each kind."""
-    print("\n### Each kind of model: p50 over that of an empty handler (p50 [ms])\n")
+@contextlib.contextmanager
+def folder_of_kinds() -> Iterator[tuple[str, dict[str, str]]]:
+    """Write a model of each kind; yield their folder, and their names by kind."""
     with tempfile.TemporaryDirectory() as folder:
         names = {}
         for index, (kind, surface) in enumerate(kinds().items()):
             names[kind] = f"model_{index}"
-            path = Path(folder) / f"model_{index}.yaml"
-            write_surface_model(SurfaceModel(f"model_{index}", surface), path)
-        served = ["--ros-args", "-r", "__node:=kinds", "-p", f"model_files:=['{folder}']"]
-        with process([*OURS, *served]):
-            for row, (kind, name) in enumerate(names.items()):
-                asked = map_calls("/kinds", name, KIND_CALLS, KIND_BATCHES)
-                if row == 0:
-                    print("| kind |", " | ".join(f"`{call.service}`" for call in asked), "|")
-                    print("|---" * (len(asked) + 1) + "|")
-                cells = []
-                for call in asked:
-                    ours, empty = map(quantiles, call.times(client))
-                    cells.append(f"{ours[0] / empty[0]:.2f} ({ours[0]:.2f})")
-                print(f"| {kind} | {' | '.join(cells)} |", flush=True)
+            model = SurfaceModel(f"model_{index}", surface, normal_force=NORMAL_FORCE)
+            write_surface_model(model, Path(folder) / f"model_{index}.yaml")
+        yield folder, names
+
+
+def serving(node: str, folder: str, *parameters: str) -> list[str]:
+    """Return the command of a node that serves the models of a folder."""
+    told = [f"model_files:=['{folder}']", *parameters]
+    return [*OURS, "--ros-args", "-r", f"__node:={node}", *(x for p in told for x in ("-p", p))]
+
+
+def kind_rows(client: ServiceClient) -> None:
+    """Print round trips on a model of each kind."""
+    print("\n### Each kind of model: p50 over that of an empty handler (p50 [ms])\n")
+    with folder_of_kinds() as (folder, names), process(serving("kinds", folder)):
+        for row, (kind, name) in enumerate(names.items()):
+            asked = map_calls("/kinds", name, KIND_CALLS, KIND_BATCHES)
+            if row == 0:
+                print("| kind |", " | ".join(f"`{call.service}`" for call in asked), "|")
+                print("|---" * (len(asked) + 1) + "|")
+            cells = []
+            for call in asked:
+                ours, empty = map(quantiles, call.times(client))
+                cells.append(f"{ours[0] / empty[0]:.2f} ({ours[0]:.2f})")
+            print(f"| {kind} | {' | '.join(cells)} |", flush=True)
+
+
+def weight_rows(client: ServiceClient) -> None:
+    """Print round trips under another weight, over those of the model as it is."""
+    print(f"\n### Each kind under another weight: p50 over the model's own (goal {WEIGHT_GOAL})\n")
+    print(
+        "By `normal_force_from: parameter`; in brackets by `wrench`, which batches do not know.\n"
+    )
+    forces = "normal_force_from:=parameter", f"normal_force:={OTHER_FORCE}"
+    with (
+        folder_of_kinds() as (folder, names),
+        process(serving("kinds", folder)),
+        process(serving("parameter", folder, *forces)),
+        process(serving("wrench", folder, "normal_force_from:=wrench")),
+    ):
+        for row, (kind, name) in enumerate(names.items()):
+            asked = map_calls("/kinds", name, KIND_CALLS, KIND_BATCHES)
+            asked[0].request.wrench.wrench.force.z = -OTHER_FORCE
+            if row == 0:
+                print("| kind |", " | ".join(f"`{call.service}`" for call in asked), "|")
+                print("|---" * (len(asked) + 1) + "|")
+            cells = []
+            for index, call in enumerate(asked):
+                ratios = []
+                for source in ("parameter", "wrench")[: 2 if index == 0 else 1]:
+                    own, other = call.times_beside(client, f"/{source}/{call.service}")
+                    ratios.append(quantiles(other)[0] / quantiles(own)[0])
+                told = " ".join(
+                    f"{ratio:.2f}" if place == 0 else f"({ratio:.2f})"
+                    for place, ratio in enumerate(ratios)
+                )
+                cells.append(f"{told} missed" if max(ratios) > WEIGHT_GOAL else told)
+            print(f"| {kind} | {' | '.join(cells)} |", flush=True)
 
 
 def client_rows(client: ServiceClient) -> None:
@@ -337,6 +392,7 @@ def main() -> None:
     ):
         service_rows(client)
         kind_rows(client)
+        weight_rows(client)
         client_rows(client)
         topic_rows(client, {"ours": ours.pid, "empty": bare.pid})
 
