@@ -162,14 +162,28 @@ class PushRun:
         after = np.clip(np.searchsorted(s, asked, side="right"), 1, len(s) - 1)
         before = after - 1
         width = s[after] - s[before]
-        t = ((asked - s[before]) / np.where(width > 0.0, width, 1.0))[:, np.newaxis]
-        h = width[:, np.newaxis]
-        a, b = self.poses[before], self.poses[after]
-        ka, kb = self._rates[before], self._rates[after]
-        cubic = (
-            (1 + 2 * t) * (1 - t) ** 2 * a
-            + t * (1 - t) ** 2 * h * ka
-            + t * t * (3 - 2 * t) * b
-            - t * t * (1 - t) * h * kb
+        place = (asked - s[before]) / np.where(width > 0.0, width, 1.0)
+        return cubic_poses(
+            place,
+            width,
+            self.poses[before],
+            self.poses[after],
+            self._rates[before],
+            self._rates[after],
         )
-        return np.asarray(cubic)
+
+
+def cubic_poses(
+    places: Floats | float, widths: Floats, a: Floats, b: Floats, ka: Floats, kb: Floats
+) -> Floats:
+    """Return poses (m, 3) at places from 0 to 1 of steps with given widths (m,).
+
+    By the cubics through the poses a and b (m, 3) at their ends, with the rates ka and kb there.
+    """
+    t, h = np.asarray(places)[..., np.newaxis], widths[:, np.newaxis]
+    return np.asarray(
+        (1 + 2 * t) * (1 - t) ** 2 * a
+        + t * (1 - t) ** 2 * h * ka
+        + t * t * (3 - 2 * t) * b
+        - t * t * (1 - t) * h * kb
+    )

@@ -59,6 +59,13 @@ class Outline(ABC):
         """Return the nearest points of the outline to points of shape (m, 2) [m]."""
 
     @abstractmethod
+    def curvatures(self, points: Floats) -> Floats:
+        """Return the outline's curvatures (m,) [1/m] where it is nearest to points (m, 2) [m].
+
+        Above 0 where it is bent outward; infinite at a vertex.
+        """
+
+    @abstractmethod
     def first_touch(self, starts: Floats, directions: Floats, radius: Floats) -> Floats:
         """Return how far tips can move before they touch.
 
@@ -177,6 +184,12 @@ class Polygon(Outline):
         else:
             normals = turn * away / distances
         return Nearest(as_vectors_of(feet), as_vectors_of(normals), distances)
+
+    def curvatures(self, points: Floats) -> Floats:
+        """See `Outline`: 0 but for vertices."""
+        away = self.nearest(points).points[:, np.newaxis] - self.vertices
+        apart = np.hypot(away[:, :, 0], away[:, :, 1]).min(axis=1)
+        return np.where(apart <= _SAME * np.ptp(self.vertices, axis=0).max(), np.inf, 0.0)
 
     def first_touch(self, starts: Floats, directions: Floats, radius: Floats) -> Floats:
         """See `Outline`: by the edges moved out by the radius, and circles about the vertices."""

@@ -160,7 +160,13 @@ def push_derivatives(
                 1.0 if mode == SLIDE_LEFT else -1.0,
             )
             twist[rows], wrench[rows], smooth[rows] = tangents(surface, some)
-    margins, following = _margins(surface, points_, inward, edges, velocities_, found.modes)
+    right, left = (
+        np.clip(_edge_angles(surface, points_, inward, edge), -_QUARTER, _QUARTER)
+        for edge in (np.conj(edges), edges)
+    )
+    angles = np.angle(np.conj(inward) * velocities_)
+    margins, following = margins_between(angles, right, left, found.modes)
+    margins[velocities_ == 0.0] = 0.0
     return PushDerivatives(
         found.twists.reshape(*lead, 3),
         found.wrenches.reshape(*lead, 3),
@@ -318,32 +324,26 @@ def _sliding(surface: LimitSurface, at: _Found) -> tuple[Floats, Floats, Bools]:
     return twist, wrench * size[:, np.newaxis, np.newaxis], surface.is_smooth_at(loads)
 
 
-def _margins(
-    surface: LimitSurface,
-    points: Complexes,
-    normals: Complexes,
-    edges: Complexes,
-    velocities: Complexes,
-    modes: Places,
+def margins_between(
+    angles: Floats, right: Floats, left: Floats, modes: Places
 ) -> tuple[Floats, Places]:
     """Return angles (m, 2) to the next modes, to the right and to the left, and these modes.
 
     From right to left about the normal come slides to the right, sticks and slides to the left;
     from 90 deg on either side the pusher leaves.
+
+    Args:
+        angles: Of the pushers' velocities from the normals [rad], shape (m,).
+        right: Where slides to the right end and sticks begin, -90 deg at least, shape (m,).
+        left: Where sticks end and slides to the left begin, 90 deg at most, shape (m,).
+        modes: Of the pushes, shape (m,).
     """
-    right, left = (
-        np.clip(_edge_angles(surface, points, normals, edge), -_QUARTER, _QUARTER)
-        for edge in (np.conj(edges), edges)
-    )
-    angle = np.angle(np.conj(normals) * velocities)
-    leaves = modes == SEPARATE
-    angle[leaves & (angle < 0.0)] += 2.0 * np.pi
+    angle = np.where((modes == SEPARATE) & (angles < 0.0), angles + 2.0 * np.pi, angles)
     quarter, rows = np.full_like(left, _QUARTER), np.arange(len(left))
     # By mode, the borders of its velocities to the right and to the left.
     low = np.stack([right, left, -quarter, quarter])[modes, rows]
     high = np.stack([left, quarter, right, 3.0 * quarter])[modes, rows]
     margins = np.maximum(np.stack([angle - low, high - angle], axis=1), 0.0)
-    margins[velocities == 0.0] = 0.0
     # Sticking velocities may reach 90 deg, or be a single direction that a turn passes.
     leave, sticks = np.full_like(modes, SEPARATE), left - right > _PASSED
     slides_right, slides_left = right > -_QUARTER, left < _QUARTER

@@ -165,14 +165,14 @@ class Pushing:
         about = as_floats("reference_point", reference_point)
         if about.shape != (2,):
             raise ShapeError(f"reference_point must have shape (2,), got {about.shape}")
-        self._scene = Scene(
+        self.scene = Scene(
             surface,
             outline,
             complex(*about.tolist()),
             complex(friction_edges(friction, 1)[0]),
             accuracy / _STEPS_PER_ACCURACY,
         )
-        self._radius, self._overlap = radius, overlap
+        self.radius, self._overlap = radius, overlap
 
     def along(self, pose: ArrayLike, path: ArrayLike) -> Generator[None, None, PushRun]:
         """Do as `simulate_push`, in stages of about a millisecond."""
@@ -204,13 +204,8 @@ class Pushing:
 
     def along_each(self, poses: ArrayLike, paths: ArrayLike) -> Generator[None, None, PushRuns]:
         """Do as `simulate_pushes`, in stages of a few milliseconds."""
-        given, ways = as_floats("poses", poses), as_floats("paths", paths)
-        if given.ndim != 2 or given.shape[1] != 3:
-            raise ShapeError(f"poses must have shape (n, 3), got {given.shape}")
-        if ways.ndim != 3 or len(ways) != len(given):
-            raise ShapeError(f"paths must have shape ({len(given)}, m, 2), got {ways.shape}")
         runs = []
-        for rollout in self._blocks(given, ways, record=False):
+        for rollout in self._blocks(*_poses_and_paths(poses, paths), record=False):
             yield from rollout.rounds()
             runs.append(rollout)
         return PushRuns(
@@ -220,21 +215,28 @@ class Pushing:
             )
         )
 
+    def recorded(self, poses: ArrayLike, paths: ArrayLike) -> Iterator[Rollout]:
+        """Yield blocks of pushes that have ended, with all their steps."""
+        for rollout in self._blocks(*_poses_and_paths(poses, paths), record=True):
+            for _ in rollout.rounds():
+                pass
+            yield rollout
+
     def _blocks(self, poses: Floats, paths: Floats, *, record: bool) -> Iterator[Rollout]:
         """Yield blocks of pushes that have not begun, at least one."""
         if paths.shape[2:] != (2,) or paths.shape[1] < 2:
             raise ShapeError(f"a path has shape (m, 2) with m at least 2, got {paths.shape[1:]}")
-        if self._scene.surface.wrench_is_closed:
+        if self.scene.surface.wrench_is_closed:
             # Sliding pushes search for their motions: many together pay for a table.
-            self._scene.surface.shape.expect(_SEARCHES * len(poses))
+            self.scene.surface.shape.expect(_SEARCHES * len(poses))
         for start in range(0, max(len(poses), 1), _BLOCK):
             block = slice(start, start + _BLOCK)
             begun, radii = self._parted(poses[block], paths[block, 0])
-            yield Rollout(self._scene, begun, paths[block], radii, record=record)
+            yield Rollout(self.scene, begun, paths[block], radii, record=record)
 
     def _parted(self, poses: Floats, tips: Floats) -> tuple[Floats, Floats]:
         """Return poses from which to begin, and distances at which the tips touch."""
-        outline = self._scene.outline
+        outline = self.scene.outline
         begun = poses.copy()
         near = outline.nearest(_seen_from(begun, tips))
         deepest = -_DEEPEST * outline.mean_radius
@@ -245,9 +247,9 @@ class Pushing:
                 f"outline: its centre may be at most {-deepest:.6g} m within"
             )
         if self._overlap == "keep":
-            return begun, np.minimum(self._radius, near.distances)
+            return begun, np.minimum(self.radius, near.distances)
         for _ in range(_PARTINGS):
-            depth = np.maximum(self._radius - near.distances, 0.0)
+            depth = np.maximum(self.radius - near.distances, 0.0)
             if not depth.any():
                 break
             c, s = np.cos(begun[:, 2]), np.sin(begun[:, 2])
@@ -256,8 +258,18 @@ class Pushing:
             begun[:, 1] -= s * nx + c * ny
             near = outline.nearest(_seen_from(begun, tips))
             # What rounding leaves is no overlap.
-            near.distances[np.abs(near.distances - self._radius) < 1e-15] = self._radius
-        return begun, np.minimum(self._radius, near.distances)
+            near.distances[np.abs(near.distances - self.radius) < 1e-15] = self.radius
+        return begun, np.minimum(self.radius, near.distances)
+
+
+def _poses_and_paths(poses: ArrayLike, paths: ArrayLike) -> tuple[Floats, Floats]:
+    """Return starts of bodies (n, 3) and paths of tips (n, m, ...), checked."""
+    given, ways = as_floats("poses", poses), as_floats("paths", paths)
+    if given.ndim != 2 or given.shape[1] != 3:
+        raise ShapeError(f"poses must have shape (n, 3), got {given.shape}")
+    if ways.ndim != 3 or len(ways) != len(given):
+        raise ShapeError(f"paths must have shape ({len(given)}, m, 2), got {ways.shape}")
+    return given, ways
 
 
 def _seen_from(poses: Floats, points: Floats) -> Floats:

@@ -69,13 +69,13 @@ class Rollout:
             record: Whether to keep the steps.
         """
         count = len(poses)
-        self._scene, self._radii = scene, radii
+        self._scene, self.radii = scene, radii
         self._batch = PushBatch(scene.surface)
         self._size = scene.outline.mean_radius
         self._exact = float(np.clip(0.05 * scene.tolerance / self._size, 4e-15, 1e-4))
         self._is_convex = scene.outline.is_convex
-        self._paths = as_complex(paths.reshape(-1, 2)).reshape(paths.shape[:2])
-        ways = np.diff(self._paths, axis=1)
+        self.paths: Complexes = as_complex(paths.reshape(-1, 2)).reshape(paths.shape[:2])
+        ways = np.diff(self.paths, axis=1)
         self._lengths = np.abs(ways)
         self._directions = ways / np.where(self._lengths > 0.0, self._lengths, 1.0)
         self.poses = poses.copy()
@@ -127,7 +127,7 @@ class Rollout:
         """Return where tips are, in which direction they move, and how far a part still goes."""
         part, place = self._part[rows], self._place[rows]
         direction = self._directions[rows, part]
-        tip = self._paths[rows, part] + place * direction
+        tip = self.paths[rows, part] + place * direction
         return tip, direction, self._lengths[rows, part] - place
 
     def _advance(self, rows: Places, moved: Floats, ends: Bools) -> None:
@@ -147,18 +147,18 @@ class Rollout:
     def _approach(self, rows: Places) -> None:
         """Move tips that do not touch to where they do, or to the ends of straight parts."""
         tip, direction, rest = self._ways(rows)
-        turn, centre = _seen(self.poses[rows], tip)
+        turn, centre = in_body_frames(self.poses[rows], tip)
         heading = direction * turn
         near = self._scene.outline.nearest(as_vectors_of(centre))
         closing = -(np.conj(as_complex(near.normals)) * heading).real
-        gap = near.distances - self._radii[rows]
+        gap = near.distances - self.radii[rows]
         touches = (gap <= _TOUCHING * self._size) & (closing > 0.0)
         cornered = np.zeros(len(rows), dtype=bool)
         if not self._is_convex:
             # Of two places that it touches a tip may leave one, and push the other.
             for place in np.flatnonzero(self._at_two_places(rows)):
                 pushed = push_in_corner(
-                    self._scene, centre[place], heading[place], float(self._radii[rows[place]])
+                    self._scene, centre[place], heading[place], float(self.radii[rows[place]])
                 )
                 cornered[place] = pushed.twist.any()
         touches |= cornered
@@ -168,7 +168,7 @@ class Rollout:
             moved[away] = self._scene.outline.first_touch(
                 as_vectors_of(centre[away]),
                 as_vectors_of(heading[away]),
-                self._radii[rows[away]],
+                self.radii[rows[away]],
             )
         touches &= rest > 0.0
         hits = touches | (moved < rest)
@@ -256,9 +256,9 @@ class Rollout:
     def _at_two_places(self, rows: Places) -> Bools:
         """Return which tips touch the outline at two places, or more."""
         tip, _, _ = self._ways(rows)
-        centre = as_vectors_of(_seen(self.poses[rows], tip)[1])
+        centre = as_vectors_of(in_body_frames(self.poses[rows], tip)[1])
         slack = TWO_PLACES * self._scene.tolerance
-        counts = self._scene.outline.touch_counts(centre, self._radii[rows], slack)
+        counts = self._scene.outline.touch_counts(centre, self.radii[rows], slack)
         return np.asarray(counts > 1)
 
     def _rate(
@@ -266,7 +266,7 @@ class Rollout:
     ) -> tuple[Floats, Floats]:
         """Return rates of poses (m, 3) by the tips' lengths, and how fast tips close in (m,)."""
         self.evaluations[rows] += 1
-        turn, centre = _seen(poses, tips)
+        turn, centre = in_body_frames(poses, tips)
         heading = directions * turn
         near = self._scene.outline.nearest(as_vectors_of(centre))
         inward = -as_complex(near.normals)
@@ -274,7 +274,7 @@ class Rollout:
         twists = np.zeros((len(rows), 3))
         if corner:
             for place in range(len(rows)):
-                radius = float(self._radii[rows[place]])
+                radius = float(self.radii[rows[place]])
                 twists[place] = push_in_corner(
                     self._scene, centre[place], heading[place], radius
                 ).twist
@@ -327,12 +327,12 @@ class Rollout:
 
         In the body's frame, about the surface's reference point; contacts in the body's frame.
         """
-        turn, centre = _seen(steps.poses, steps.tips)
+        turn, centre = in_body_frames(steps.poses, steps.tips)
         heading = steps.directions * turn
         near = self._scene.outline.nearest(as_vectors_of(centre))
         inward = -as_complex(near.normals)
         # Points that the tip has not reached are no contacts, whichever way it moves.
-        gap = near.distances - self._radii[steps.pushes]
+        gap = near.distances - self.radii[steps.pushes]
         pushes = (np.conj(inward) * heading).real > 0.0
         pushes &= gap <= 1e3 * self._scene.tolerance
         twists, wrenches = np.zeros((len(centre), 3)), np.zeros((len(centre), 3))
@@ -344,7 +344,7 @@ class Rollout:
             twists[some], modes[some], wrenches[some] = found.twists, found.modes, found.wrenches
         if not self._is_convex:
             slack = 2.0 * TWO_PLACES * self._scene.tolerance
-            radii = self._radii[steps.pushes]
+            radii = self.radii[steps.pushes]
             counts = self._scene.outline.touch_counts(as_vectors_of(centre), radii, slack)
             for row in np.flatnonzero((counts > 1) & pushes):
                 pushed = push_in_corner(self._scene, centre[row], heading[row], float(radii[row]))
@@ -353,7 +353,7 @@ class Rollout:
         return twists, modes, wrenches, near.points
 
 
-def _seen(poses: Floats, tips: Complexes) -> tuple[Complexes, Complexes]:
+def in_body_frames(poses: Floats, tips: Complexes) -> tuple[Complexes, Complexes]:
     """Return what turns vectors into the frames of bodies with poses (m, 3), and tips in them."""
     turn = np.exp(-1j * poses[:, 2])
     arms = tips.copy()

@@ -91,6 +91,12 @@ class Ellipse(Outline):
         normals /= length[:, np.newaxis]
         return Nearest(feet @ self._turn.T + self.centre, normals @ self._turn.T, distances)
 
+    def curvatures(self, points: Floats) -> Floats:
+        """See `Outline`: (a b)^-2 (x^2 / a^4 + y^2 / b^4)^(-3/2)."""
+        own = (self.nearest(points).points - self.centre) @ self._turn
+        normals = own / self.semi_axes**2
+        return np.asarray((self.semi_axes.prod() * np.hypot(*normals.T) ** 1.5) ** -2.0)
+
     def first_touch(self, starts: Floats, directions: Floats, radius: Floats) -> Floats:
         """See `Outline`."""
         return _touch_of_convex(self, starts, directions, radius)
@@ -150,8 +156,13 @@ class SmoothCurve(Outline):
 
     def nearest(self, points: Floats) -> Nearest:
         """See `Outline`: Newton's method from the nearest of the curve's samples."""
-        square = self._sample_squares(points)
-        return self._from_samples(points, square.argmin(axis=1))
+        return self._from_samples(points, self._nearest_samples(points))
+
+    def curvatures(self, points: Floats) -> Floats:
+        """See `Outline`."""
+        place = self._places_near(points, self._nearest_samples(points))
+        first, second = self._curve(place, 1), self._curve(place, 2)
+        return np.asarray(cross(first, second) / np.hypot(*first.T) ** 3)
 
     def touch_counts(self, points: Floats, distances: Floats, slack: float) -> Places:
         """See `Outline`: the least distances along the curve."""
@@ -167,6 +178,9 @@ class SmoothCurve(Outline):
         touches = np.abs(near.distances - distance) <= slack
         return list(zip(near.points[touches], near.normals[touches], strict=True))
 
+    def _nearest_samples(self, points: Floats) -> Places:
+        return np.asarray(self._sample_squares(points).argmin(axis=1))
+
     def _sample_squares(self, points: Floats) -> Floats:
         """Return squared distances of samples, up to a number for each point, shape (m, n)."""
         samples = self._samples.vertices
@@ -181,6 +195,14 @@ class SmoothCurve(Outline):
 
     def _from_samples(self, points: Floats, samples: Places) -> Nearest:
         """Return the least distances near samples, one for each point."""
+        place = self._places_near(points, samples)
+        feet, first = self._curve(place), self._curve(place, 1)
+        first /= np.hypot(*first.T)[:, np.newaxis]
+        normals = np.stack([first[:, 1], -first[:, 0]], axis=1)
+        return Nearest(feet, normals, ((points - feet) * normals).sum(axis=1))
+
+    def _places_near(self, points: Floats, samples: Places) -> Floats:
+        """Return where the curve is nearest to points, near a sample each."""
         place = start = self._places[samples]
         for _ in range(_ROUNDS):
             arm = self._curve(np.mod(place, self._end)) - points
@@ -196,11 +218,7 @@ class SmoothCurve(Outline):
             place = moved
             if done:
                 break
-        place = np.mod(place, self._end)
-        feet, first = self._curve(place), self._curve(place, 1)
-        first /= np.hypot(*first.T)[:, np.newaxis]
-        normals = np.stack([first[:, 1], -first[:, 0]], axis=1)
-        return Nearest(feet, normals, ((points - feet) * normals).sum(axis=1))
+        return np.asarray(np.mod(place, self._end))
 
     def first_touch(self, starts: Floats, directions: Floats, radius: Floats) -> Floats:
         """See `Outline`: concave ones from where their samples' polygon is touched."""
