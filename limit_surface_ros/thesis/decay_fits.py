@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.decay.basis import count_terms
+from limit_surface_ros.decay.basis import count_terms, real_basis
 from limit_surface_ros.decay.coefficients import fit_coefficients
 from limit_surface_ros.decay.examples import example
+from limit_surface_ros.decay.exponential_sum import ExponentialSum
 from limit_surface_ros.decay.fit import fit_decay
 from limit_surface_ros.decay.grids import largest_error
 from limit_surface_ros.decay.rates import BERNSTEIN_RATE_CONSTANT
@@ -40,6 +41,8 @@ METHOD_LABELS = {
     "esprit": "matrix pencil",
     "best": "best, rates moved",
 }
+# About the transition at 1 s [s].
+KINK = 0.1
 # Moving the rates of more terms takes minutes.
 _MOST_MOVED = 31
 
@@ -93,7 +96,14 @@ def many_terms(settings: Settings, store: Store) -> Findings:
     response = example("f1")(times)
     errors = [each.max_error for each in fits.values()]
     everywhere = largest_error(fit.sum, example("f1"), 0.0, MAX_DELAY)
-    near, far = _oscillation(times, response - fit.sum(times))
+    error = response - fit.sum(times)
+    near, far = _oscillation(times, error)
+    squares = fit_coefficients(fit.sum.rates, times, response, "2")
+    swings = _oscillation(times, response - squares.sum(times))
+    quick = fit.sum.rates.imag > 0.5 * fit.sum.rates.imag.max()
+    slow_part = ExponentialSum(fit.sum.rates[~quick], fit.sum.coefficients[~quick])
+    without = np.abs(response - slow_part(times))
+    kink = np.abs(times - 1.0) < KINK
     claims = (
         Claim(
             "The fit gets better as terms are added, and the error's oscillations get smaller.",
@@ -113,6 +123,20 @@ def many_terms(settings: Settings, store: Store) -> Findings:
             f"{far:.3e}.",
             bool(0.8 < near / far < 1.25),
         ),
+        Claim(
+            "With least squares the amplitude would vary with time.",
+            f"The same rates by least squares: {swings[0]:.1e} in the first half, {swings[1]:.1e} "
+            "in the second.",
+            bool(swings[0] > 1.25 * swings[1] or swings[1] > 1.25 * swings[0]),
+        ),
+        Claim(
+            "The terms of high frequency serve the sharp transition at 1 s.",
+            f"Without the half of them that oscillates fastest the sum is off by up to "
+            f"{without[kink].max():.1e} within {KINK:g} s of the transition and by a median of "
+            f"{np.median(without[~kink & (times > KINK)]):.1e} elsewhere.",
+            bool(without[kink].max() > 5.0 * np.median(without[~kink & (times > KINK)])),
+        ),
+        _conditions(settings),
     )
     comparison = _comparison(settings)
     return Findings(
@@ -157,6 +181,26 @@ def _count_claim(number: str, fit: CoefficientFit, settings: Settings) -> Claim:
         f"{pairs} pairs and {real} real; their best sum misses the response by "
         f"{fit.max_error:.4e} at most on the {settings.samples} samples (certified).",
         real == 1,
+    )
+
+
+def _conditions(settings: Settings) -> Claim:
+    """Judge arbitrary rates beside characteristic roots, at as many terms."""
+    times = np.linspace(0.0, MAX_DELAY, settings.samples)
+    response = example("f1")(times)
+    fit = thesis_fit(ROOTS["2.6"], settings.samples)
+    even = np.linspace(0.5, 0.5 * fit.sum.terms, fit.sum.terms) * -1.0
+    arbitrary = fit_coefficients(even, times, response)
+    conditions = [
+        float(np.linalg.cond(real_basis(rates, times))) for rates in (even, fit.sum.rates)
+    ]
+    return Claim(
+        "Arbitrary rates can make ill-conditioned matrices or a poor fit; characteristic roots "
+        "do not.",
+        f"{fit.sum.terms} terms: real rates at equal steps of 0.5/s give a condition number of "
+        f"{conditions[0]:.0e} and an error of {arbitrary.max_error:.1e}, the roots of (2.4) "
+        f"{conditions[1]:.0e} and {fit.max_error:.1e}.",
+        conditions[0] > 1e3 * conditions[1] or arbitrary.max_error > 2.0 * fit.max_error,
     )
 
 

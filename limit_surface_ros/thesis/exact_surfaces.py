@@ -47,7 +47,32 @@ def one_point(settings: Settings, store: Store) -> Findings:
         f"times f_y, to {np.abs([moment, size - bodies.FRICTION]).max():.1e}.",
         bool(np.abs([moment, size - bodies.FRICTION]).max() < _ON_PLANE),
     )
-    return Findings({"thesis": figure}, {"curve": load_table(loads)}, (claim,))
+    return Findings({"thesis": figure}, {"curve": load_table(loads)}, (claim, _moment(settings)))
+
+
+def _moment(settings: Settings) -> Claim:
+    """Judge the moment of (3.1): loads must resist each motion at least as others do."""
+    body = bodies.three_points()
+    pairs = random_motions(body, min(settings.motions, 400), settings.seed)
+    # The points' forces: friction against the motion of each.
+    x, y = body.points.T
+    vx = pairs.twists[:, :1] - pairs.twists[:, 2:] * y
+    vy = pairs.twists[:, 1:2] + pairs.twists[:, 2:] * x
+    forces = body.friction_limits / np.hypot(vx, vy) * np.stack([vx, vy])
+    wrong = pairs.wrenches.copy()
+    wrong[:, 2] = (x * forces[0] - y * forces[1]).sum(axis=1)
+    shares = []
+    for loads in (wrong, pairs.wrenches):
+        powers = pairs.twists @ loads.T
+        own = np.diagonal(powers)
+        shares.append(100.0 * float(np.mean(powers.max(axis=1) > own + 1e-9)))
+    return Claim(
+        "The moment of the loads is the sum of x fx - y fy, equation (3.1).",
+        f"With it {shares[0]:.0f} % of {len(pairs)} motions of the triangle would be resisted "
+        "more by the load of another motion, against maximum dissipation; with x fy - y fx "
+        f"{shares[1]:.0f} %. The printed Matlab code has it right.",
+        shares[0] == 0.0,
+    )
 
 
 def bar_layout(settings: Settings, store: Store) -> Findings:

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     Table: TypeAlias = Mapping[str, ArrayLike]
 
 
+VERDICTS = ("holds", "holds partly", "does not hold")
+
+
 @dataclass(frozen=True)
 class Claim:
     """Something that the thesis's text says, and what came out here.
@@ -25,12 +28,19 @@ class Claim:
     Attributes:
         said: What the text says, in this package's own words.
         measured: What was measured, with numbers.
-        holds: Whether it holds; None where the measurement cannot decide.
+        holds: Whether all of it holds.
+        partly: Whether part of it does, where not all does.
     """
 
     said: str
     measured: str
-    holds: bool | None
+    holds: bool
+    partly: bool = False
+
+    @property
+    def verdict(self) -> str:
+        """In words: one of `VERDICTS`."""
+        return VERDICTS[0 if self.holds else 1 if self.partly else 2]
 
 
 @dataclass(frozen=True)
@@ -43,12 +53,17 @@ class Findings:
         tables: The numbers behind the pictures, by file stem.
         claims: What the text says about the figure.
         remarks: What a reader should know, a sentence or two.
+        captions: What stands above a picture, by its file stem; none above that named "thesis",
+            "Beyond the thesis" above others.
+        listings: Texts that are shown as they stand, by their headings.
     """
 
     pictures: Mapping[str, Figure]
     tables: Mapping[str, Table]
     claims: tuple[Claim, ...] = ()
     remarks: str = ""
+    captions: Mapping[str, str] = field(default_factory=dict)
+    listings: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -56,7 +71,7 @@ class Study:
     """One figure of the thesis.
 
     Attributes:
-        number: As in "2.14".
+        number: As in "2.14"; "B.1" is the first of what the thesis leaves to later work.
         title: What it shows, in this package's own words.
         carry_out: Computes and draws it.
         needs: Names of the fits that it asks the store for, so that progress can count them.

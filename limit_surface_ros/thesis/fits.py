@@ -39,6 +39,9 @@ BODIES: dict[str, tuple[Callable[[], PointContacts], bool]] = {
 }
 # J2 weighs the errors of motion as much as those of load, J1 not at all.
 VELOCITY_WEIGHTS = {"J1": 0.0, "J2": 1.0}
+# By name, between and beyond the two.
+MORE_WEIGHTS = {f"w{weight:g}": weight for weight in (0.01, 0.03, 0.1, 0.3, 3.0)}
+VELOCITY_WEIGHTS |= MORE_WEIGHTS
 # The thesis's loads and lengths are near one as they are.
 UNSCALED = Scaling()
 
@@ -50,7 +53,7 @@ class Fit:
     Attributes:
         body: Name of one of `BODIES`.
         family: Name of one of `FAMILIES`.
-        objective: "J1" or "J2".
+        objective: "J1", "J2", or one of `MORE_WEIGHTS`.
         noisy: Whether loads and motions carry noise.
     """
 
@@ -122,6 +125,7 @@ FAMILIES: dict[str, Callable[[Pairs, str, Search], FitResult]] = {
     **{f"thesis{terms}": _thesis(terms) for terms in (1, 2, 3, 4)},
     "second": _second,
     "polynomial": _polynomial(convex=False),
+    "convex_polynomial": _polynomial(convex=True),
     **{f"norms{terms}": _norms(terms) for terms in (3, 4)},
     "dissipation4": _dissipation(4),
 }
@@ -130,11 +134,12 @@ LABELS = {
     **{f"thesis{terms}": f"{terms} terms" for terms in (2, 3, 4)},
     "second": "2nd approximation",
     "polynomial": "4th order polynomial",
+    "convex_polynomial": "4th order polynomial, convex",
     **{f"norms{terms}": f"{terms} norms" for terms in (3, 4)},
     "dissipation4": "4 terms of dissipation",
 }
 # These are fitted to loads alone: an objective in their label would mislead.
-LOADS_ALONE = ("polynomial", "dissipation4")
+LOADS_ALONE = ("polynomial", "convex_polynomial", "dissipation4")
 
 
 @cache
@@ -165,6 +170,11 @@ def test_pairs(name: str, noisy: bool, settings: Settings) -> Pairs:
 
 def fitted(fit: Fit, store: Store) -> LimitSurface:
     """Return a fitted surface, from the store if it is there."""
+    return fitted_model(fit, store).surface
+
+
+def fitted_model(fit: Fit, store: Store) -> SurfaceModel:
+    """Return a fitted surface with what its file says of the fit."""
 
     def make() -> SurfaceModel:
         pairs = training_pairs(fit.body, fit.noisy, store.settings)
@@ -172,7 +182,7 @@ def fitted(fit: Fit, store: Store) -> LimitSurface:
         result = FAMILIES[fit.family](pairs, fit.objective, search)
         return SurfaceModel(fit.name, result.surface, fit=result.summary())
 
-    return store.surface(fit.name, make).surface
+    return store.surface(fit.name, make)
 
 
 def _with_noise(pairs: Pairs, settings: Settings, stream: int) -> Pairs:

@@ -185,6 +185,7 @@ def _claims(
             f"Largest error up to 6 s, basis 0 to 3: {_by_basis(within)}. With this f3, the slow "
             "roots of basis 3 do not keep it from fitting.",
             within["basis 3"] > 2.0 * max(others) and max(others) < 1e-2,
+            max(others) < 1e-2,
         ),
         Claim(
             "After 6 s basis 0 has a large response that decreases in the end, the others a "

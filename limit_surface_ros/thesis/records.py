@@ -42,6 +42,8 @@ class Record:
         tables: CSV files in the folder.
         claims: What the text says about the figure, and what was measured.
         remarks: What a reader should know.
+        captions: What stands above each picture; may be empty.
+        listings: Texts that are shown as they stand, by their headings.
     """
 
     number: str
@@ -51,6 +53,8 @@ class Record:
     tables: tuple[str, ...]
     claims: tuple[Claim, ...]
     remarks: str
+    captions: tuple[str, ...]
+    listings: Mapping[str, str]
 
 
 def find_record(store: Store, study: Study) -> Record | None:
@@ -83,6 +87,11 @@ def keep_record(store: Store, study: Study, findings: Findings) -> Record:
         "tables": [f"{name}.csv" for name in findings.tables],
         "claims": [plain(asdict(claim)) for claim in findings.claims],
         "remarks": findings.remarks,
+        "captions": [
+            findings.captions.get(name, "" if name == "thesis" else "Beyond the thesis")
+            for name in findings.pictures
+        ],
+        "listings": dict(findings.listings),
     }
     write_atomically(folder / RECORD, json.dumps(kept, indent=1))
     return _record_of(study, folder, kept)
@@ -107,4 +116,6 @@ def _record_of(study: Study, folder: Path, kept: Mapping[str, Any]) -> Record:
         tables=tuple(kept["tables"]),
         claims=tuple(Claim(**claim) for claim in kept["claims"]),
         remarks=kept["remarks"],
+        captions=tuple(kept["captions"]),
+        listings=dict(kept["listings"]),
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Carry out the studies of all figures, one by one, and write the page that shows them."""
+"""Carry out the studies of all figures, one by one; write the page and the table of claims."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from limit_surface_ros import __version__
 from limit_surface_ros.files.atomic_write import write_atomically
-from limit_surface_ros.thesis.page import page_of
+from limit_surface_ros.thesis.page import claims_text, page_of
 from limit_surface_ros.thesis.records import find_record, keep_record
 from limit_surface_ros.thesis.settings import FULL
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from limit_surface_ros.thesis.store import Store
 
 PAGE = "index.html"
+CLAIMS = "claims.md"
 
 
 def carry_out(
@@ -65,6 +66,7 @@ def carry_out(
         progress(done + len(fitted & fits), total)
     page = store.folder / PAGE
     write_atomically(page, page_of(records, _subtitle(store)))
+    write_atomically(store.folder / CLAIMS, claims_text(records))
     return page
 
 

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 from limit_surface_ros.thesis import (
+    beyond_decays,
+    beyond_surfaces,
     decay_fits,
     decay_system,
     exact_surfaces,
@@ -19,4 +21,6 @@ STUDIES = (
     *exact_surfaces.STUDIES,
     *surface_fits.STUDIES,
     *surface_errors.STUDIES,
+    *beyond_decays.STUDIES,
+    *beyond_surfaces.STUDIES,
 )

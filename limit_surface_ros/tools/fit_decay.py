@@ -20,6 +20,7 @@ import numpy as np
 from limit_surface_ros import __version__
 from limit_surface_ros.checks import counted
 from limit_surface_ros.decay.coefficients import NORMS
+from limit_surface_ros.decay.delay.words import system_in_words
 from limit_surface_ros.decay.examples import EXAMPLES as RESPONSES
 from limit_surface_ros.decay.fit import AUTO, METHODS, Options, fit_decay
 from limit_surface_ros.decay.grids import largest_error
@@ -30,7 +31,6 @@ from limit_surface_ros.files.decay_file import DecayModel, write_decay_model
 from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
 from limit_surface_ros.tools.common.csv_options import OF_RESPONSES
 from limit_surface_ros.tools.common.decay_input import add_input_options, read_input
-from limit_surface_ros.tools.common.delay_report import system_in_words
 from limit_surface_ros.tools.common.options import check_output, refuse_empty, refuse_unused
 from limit_surface_ros.tools.common.program import program_parser, run_program
 from limit_surface_ros.tools.common.training_data import is_bag

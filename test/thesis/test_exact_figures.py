@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The promise of Figures 3.1 to 3.5: what the text says of them holds."""
+"""The promise of Figures 3.1 to 3.5: what the text says holds, but for a misprinted sign."""
 
 import numpy as np
 import pytest
@@ -13,9 +13,11 @@ pytest.importorskip("matplotlib", reason="matplotlib draws the pictures")
 
 
 @pytest.mark.parametrize("study", STUDIES, ids=lambda study: study.number)
-def test_every_claim_of_the_exact_surfaces_holds(tmp_path, study):
+def test_every_claim_of_the_exact_surfaces_holds_but_the_sign_of_the_moment(tmp_path, study):
     findings = study.carry_out(QUICK, Store(tmp_path, QUICK))
-    assert [claim for claim in findings.claims if not claim.holds] == []
+    wrong = [claim.said for claim in findings.claims if not claim.holds]
+    assert wrong == [said for said in wrong if "equation (3.1)" in said]
+    assert len(wrong) == (study.number == "3.1")
     assert findings.tables
 
 

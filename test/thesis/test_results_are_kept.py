@@ -115,7 +115,8 @@ def test_the_page_holds_its_pictures_and_says_what_holds(tmp_path):
     assert "<script" not in page
     assert "http" not in page
     assert "said &lt;2.1&gt;" in page
-    assert "2 hold, 0 do not hold, 0 stay open" in page
+    assert "2 hold, 0 hold partly, 0 do not hold" in page
+    assert (tmp_path / "claims.md").read_text().count("| seen | holds |") == 2
     assert 'href="figure_2_14/t.csv"' in page
 
 

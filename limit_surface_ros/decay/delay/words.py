@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A delay system in words: what `fit_decay --show-system` prints."""
+"""A delay system in words: what `fit_decay --show-system` and the page of the thesis show."""
 
 from __future__ import annotations
 
