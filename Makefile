@@ -2,7 +2,7 @@
 # Every target sets up what it needs first: see scripts/with_ros.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help demo run test test_nightly test_exports lint docs bench clean
+.PHONY: help demo run test test_nightly test_exports lint docs gallery bench clean
 
 PROGRAMS := install/limit_surface_ros/lib/limit_surface_ros
 SHARE := install/limit_surface_ros/share/limit_surface_ros
@@ -37,6 +37,10 @@ lint: ## Check style, types and package descriptions
 docs: ## Build the documentation into docs/_build/html
 	@scripts/with_ros --with docs -- python3 -m sphinx -W --keep-going -q docs docs/_build/html
 	@echo "open docs/_build/html/index.html"
+
+gallery: ## Draw the pictures of the gallery anew (ARGS name some of its contacts)
+	@scripts/with_ros --with extras -- python3 examples/gallery/make_gallery.py \
+	    docs/images/gallery $(ARGS)
 
 bench: ## Measure against named peers, into benchmarks/RESULTS.md (ARGS name some of them)
 	@scripts/with_ros --with bench -- python3 benchmarks/run.py $(ARGS)

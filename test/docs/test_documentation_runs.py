@@ -38,8 +38,10 @@ PAGES = sorted(
     for path in [ROOT / "README.md", *ROOT.glob("docs/**/*.md")]
     if path.exists() and not {"_build", "generated"} & set(path.relative_to(ROOT).parts)
 )
-# What the commands before it print, compared where the page has a test of its own.
+# What the blocks before it print: compared, as `agree` says.
 OUTPUT = "output"
+# Code that is wider has to be scrolled where the documentation is read.
+WIDEST = 92
 SHOWN = {
     OUTPUT,
     "text",
@@ -152,6 +154,7 @@ def own_files(tmp_path):
     """The files that README takes the reader to have: a model, pushes, a contact, a robot."""
     folder = tmp_path / "work"
     folder.mkdir()
+    (folder / "examples").symlink_to(ROOT / "examples")
     feet = [[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]]
     body = PointContacts(feet, [1.0, 1.0, 1.0], Scaling(0.05, 3.0))
     write_surface_model(SurfaceModel("mine", body), folder / "model.yaml")
@@ -174,12 +177,14 @@ WITH_CODE = [page for page in PAGES if blocks_of(page) and page != FIRST_HOUR]
 
 
 @pytest.mark.parametrize("page", WITH_CODE, ids=lambda page: str(page.relative_to(ROOT)))
-def test_every_code_block_of_a_page_runs(page, own_files, environment):
+def test_every_code_block_of_a_page_runs_and_prints_what_is_shown(page, own_files, environment):
     blocks = blocks_of(page)
     bash = "".join(block.text for block in blocks if block.language != "python")
     if "ros2 " in bash or "rclpy" in "".join(block.text for block in blocks):
         pytest.importorskip("rclpy", reason="rclpy is not installed")
         pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
+    if "make_bag" in bash:
+        pytest.importorskip("rosbags", reason="rosbags writes the bag")
     if "plot_" in bash or "reproduce_thesis" in bash:
         pytest.importorskip("matplotlib", reason="matplotlib draws the pictures")
     script = script_of(blocks).replace("/path/to/", f"{own_files}/")
@@ -191,6 +196,7 @@ def test_every_code_block_of_a_page_runs(page, own_files, environment):
         text=True,
     )
     assert run.returncode == 0, f"{run.stdout}\n{run.stderr}"
+    assert_shown(page, run.stdout)
 
 
 FORMATS = [
@@ -219,14 +225,32 @@ def test_both_descriptions_of_contacts_and_both_sorts_of_csv_are_shown():
 
 
 def outputs_of(page: Path) -> list[str]:
-    """Return the lines that a page shows as printed, in order."""
+    """Return the lines that a page shows as printed, in order; README beside the print()."""
     text = page.read_text(encoding="utf-8")
+    if page.name == "README.md":
+        return re.findall(r"^print\(.*\)  # (.+)$", text, re.MULTILINE)
     blocks = [match[3] for match in FENCE.finditer(text) if match[2] == OUTPUT]
     return [line for block in blocks for line in block.splitlines()]
 
 
+def assert_shown(page: Path, stdout: str) -> None:
+    """Look for the lines that a page shows in what was printed, in order."""
+    printed = iter(stdout.splitlines())
+    for shown in outputs_of(page):
+        found = any(agree(shown, line) for line in printed)
+        assert found, f"{shown}\n\nnot in\n\n{stdout}"
+
+
 def agree(shown: str, printed: str) -> bool:
-    """Tell whether a line is printed as shown, or begins so, but for last digits of numbers."""
+    """Tell whether a line is printed as shown, or begins so, but for last digits of numbers.
+
+    A line that begins with "... " is looked for where its first word stands in what was printed.
+    """
+    if shown.startswith("... "):
+        shown = shown[4:].removesuffix(" ...")
+        first = re.split(r"-?\d", shown)[0]
+        starts = [match.start() for match in re.finditer(re.escape(first), printed)]
+        return any(agree(shown, printed[start:]) for start in starts)
     number = re.compile(r"-?\d+\.?\d*(?:e[+-]?\d+)?")
     words, numbers = number.split(shown), number.findall(shown)
     others, found = number.split(printed), number.findall(printed)
@@ -254,10 +278,7 @@ def test_the_first_hour_prints_what_it_shows(tmp_path, environment):
         text=True,
     )
     assert run.returncode == 0, f"{run.stdout}\n{run.stderr}"
-    printed = iter(run.stdout.splitlines())
-    for shown in outputs_of(FIRST_HOUR):
-        found = any(agree(shown, line) for line in printed)
-        assert found, f"{shown}\n\nnot in\n\n{run.stdout}"
+    assert_shown(FIRST_HOUR, run.stdout)
     for name in ("triangle.png", "push.png"):
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
     assert "error_code=100" in run.stdout
@@ -268,6 +289,25 @@ def test_a_line_that_is_printed_otherwise_does_not_agree():
     assert agree(shown, "held out  2000 pairs: mean angle 4.05 deg, velocity error 0.07")
     assert not agree(shown, "held out    2000 pairs: mean angle 5.04 deg")
     assert not agree(shown, "training    2000 pairs: mean angle 4.04 deg")
+    inside = "... slips=True, slip_time=4.629 ..."
+    assert agree(inside, "Response(slips=True, slip_time=4.6293791, earliest=4.3)")
+    assert not agree(inside, "Response(slips=True, slip_time=5.6293791, earliest=4.3)")
+    assert not agree(inside, "Response(slip_time=4.629)")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_no_code_is_wider_than_the_column_that_it_is_read_in(page):
+    for match in FENCE.finditer(page.read_text(encoding="utf-8")):
+        for line in match[3].splitlines():
+            assert len(line) <= WIDEST, line
+
+
+# Nothing on a page that prints is left unseen: these show no output because there is none to show.
+@pytest.mark.parametrize("page", WITH_CODE, ids=lambda page: page.stem)
+def test_a_page_that_prints_shows_what(page):
+    code = "".join(block.text for block in blocks_of(page))
+    prints = re.search(r"print\(|fit_\w+ \w|plot_\w+ \w|check_|service call|_surface \w", code)
+    assert outputs_of(page) or not prints
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
