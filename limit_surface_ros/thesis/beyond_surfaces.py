@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.thesis.findings import Table
     from limit_surface_ros.thesis.settings import Settings
     from limit_surface_ros.thesis.store import Store
 
@@ -202,7 +203,7 @@ def minima(settings: Settings, store: Store) -> Findings:
             min(good.values()) < 2.0,
         ),
     )
-    table = {
+    table: Table = {
         "fit": [f"{BODIES[fit.body]}, {fit.label}" for fit in rows],
         "starts": [row[0] for row in rows.values()],
         "minima": [row[1] for row in rows.values()],

@@ -189,7 +189,7 @@ def _conditions(settings: Settings) -> Claim:
     times = np.linspace(0.0, MAX_DELAY, settings.samples)
     response = example("f1")(times)
     fit = thesis_fit(ROOTS["2.6"], settings.samples)
-    even = np.linspace(0.5, 0.5 * fit.sum.terms, fit.sum.terms) * -1.0
+    even = np.linspace(-0.5, -0.5 * fit.sum.terms, fit.sum.terms).astype(complex)
     arbitrary = fit_coefficients(even, times, response)
     conditions = [
         float(np.linalg.cond(real_basis(rates, times))) for rates in (even, fit.sum.rates)
