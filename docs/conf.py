@@ -9,6 +9,7 @@ DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS))
 sys.path.insert(0, str(DOCS.parent))
 
+from generate_explorer import write_explorer  # noqa: E402
 from generate_reference import write_pages  # noqa: E402
 
 project = "limit_surface_ros"
@@ -22,7 +23,7 @@ extensions = [
     "sphinx-mathjax-offline",
     "sphinx_copybutton",
 ]
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "reference/generated/explorer"]
 myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 3
 
@@ -81,3 +82,5 @@ def setup(app):
 
 
 write_pages(DOCS / "reference" / "generated")
+# Copied beside the pages, into which it is framed.
+html_extra_path = [str(write_explorer(DOCS / "reference" / "generated" / "explorer"))]

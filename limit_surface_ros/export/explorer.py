@@ -33,7 +33,7 @@ def explorer_page(models: Sequence[SurfaceModel]) -> str:
 
     Args:
         models: One to four, about one point of one frame. The outline of the push is that of the
-            first: the hull of its support points, or else a disc of its characteristic length.
+            first: its own, the hull of its support points, or a disc of its characteristic length.
 
     Raises:
         DataError: There are none or more models, or the kind of one cannot be exported.
@@ -58,7 +58,15 @@ def explorer_page(models: Sequence[SurfaceModel]) -> str:
 
 
 def outline_of(model: SurfaceModel) -> Floats:
-    """Return an outline about the reference point, counter-clockwise, shape (n, 2) [m]."""
+    """Return an outline about the reference point, counter-clockwise, shape (n, 2) [m].
+
+    The model's own where its file has one, else the hull of its support points, else a disc.
+    """
+    if model.outline is not None:
+        corners = model.outline.drawn() - model.reference_point
+        x, y = corners.T
+        turn = float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+        return np.asarray(corners if turn > 0.0 else corners[::-1])
     contact = model.surface.contact_points
     if contact is not None:
         from scipy.spatial import ConvexHull, QhullError

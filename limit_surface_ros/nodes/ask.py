@@ -36,6 +36,8 @@ EXAMPLES = """examples:
 
 Fields that no option names are given in YAML, as to ros2:
   ask evaluate '{times: [0.0, 0.5, 1.0]}'
+
+docs/tutorials/first_hour.md shows it at work; README.md lists services and topics.
 """
 # Where an option's numbers go: the first of these paths that a message has.
 PATHS = {

@@ -34,6 +34,19 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
 NAME = "decay"
+HELP = """\
+services of decay:
+  ~/evaluate, ~/time_to_level                  the load over time
+  ~/predict_stop, ~/predict_slide              when and where a body rests
+  ~/predict_slip, ~/required_normal_force      when a grasp slips, and what holds it
+  ~/fit_running                                what measurements taught, as a model file
+  ~/list_models, ~/describe_model, ~/reload    what is loaded
+topics of decay:
+  ~/onset -> ~/wrench, ~/value, ~/forecast, ~/time_left
+  ~/measurement                                corrects the running onset
+  ~/held_wrench -> ~/required_normal_force
+  /diagnostics
+"""
 # A stamp later than this is no clock a little ahead [ns]: of a measurement it is wrong, an onset
 # may be meant so.
 LATEST_AHEAD = SECOND
@@ -362,7 +375,7 @@ SERVICES = (
 def main() -> int:
     """Run the node until SIGINT or SIGTERM; return the exit code."""
     tables = {NAME: [*SETTINGS, *COMMON_SETTINGS]}
-    return spin.run(lambda: [DecayNode()], tables, __doc__, sys.argv)
+    return spin.run(lambda: [DecayNode()], tables, f"{__doc__}\n\n{HELP}", sys.argv)
 
 
 if __name__ == "__main__":

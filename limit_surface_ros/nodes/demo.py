@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Program: show the two nodes at work.
+"""Show the two nodes at work.
 
 Starts both nodes in a process of their own and asks the first from this one what a handful of
 loads do to the body of the default model, prints a table, and checks each answer: the load that
@@ -116,7 +116,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the demonstration; return 0 if every answer agrees."""
     assert __doc__ is not None
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        description=__doc__,
+        epilog="docs/tutorials/first_hour.md takes the same way step by step.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.parse_args(argv)
     namespace = f"/demo_{os.getpid()}"

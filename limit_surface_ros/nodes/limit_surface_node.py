@@ -47,6 +47,18 @@ if TYPE_CHECKING:
     from limit_surface_ros.surface.base import LimitSurface
 
 NAME = "limit_surface"
+HELP = """\
+services of limit_surface:
+  ~/wrench_to_twist, ~/wrenches_to_twists      motions that loads cause
+  ~/twist_to_wrench, ~/twists_to_wrenches      loads that motions need
+  ~/push, ~/simulate_push, ~/simulate_pushes   what pushes do to the body
+  ~/list_models, ~/describe_model, ~/reload    what is loaded
+topics of limit_surface:
+  ~/wrench -> ~/predicted_twist, ~/predicted_twist_with_covariance
+  ~/twist -> ~/required_wrench
+  ~/surface, ~/push, ~/push_path, /diagnostics
+  with learn: ~/measured_wrench, ~/measured_twist; service ~/save_learnt
+"""
 # Of the region whose half-axes are answered, where a request asks for none.
 PROBABILITY = 0.9
 SETTINGS = (
@@ -316,7 +328,7 @@ SERVICES = (
 def main() -> int:
     """Run the node until SIGINT or SIGTERM; return the exit code."""
     tables = {NAME: [*SETTINGS, *COMMON_SETTINGS]}
-    return spin.run(lambda: [LimitSurfaceNode()], tables, __doc__, sys.argv)
+    return spin.run(lambda: [LimitSurfaceNode()], tables, f"{__doc__}\n\n{HELP}", sys.argv)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from browser_helpers import document_of, needs_browser
 from export_models import MODELS, SCALING, TRIANGLE
 from limit_surface_ros.export.explorer import explorer_page, outline_of
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
+from limit_surface_ros.motion.outline import Polygon
 from limit_surface_ros.motion.push import push
 from limit_surface_ros.surface import PointContacts
 from limit_surface_ros.tools.explore_surface import main
@@ -95,6 +96,20 @@ def test_an_outline_is_the_hull_of_support_points_or_a_disc():
     line = PointContacts([[0.0, 0.0], [0.1, 0.0], [0.2, 0.0]], [1.0] * 3, SCALING)
     assert len(outline_of(SurfaceModel("line", line))) == 48
     assert len(outline_of(SurfaceModel("norms", MODELS["norms_4"]))) == 48
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_an_outline_of_the_model_is_taken_about_its_reference_point(order):
+    corners = np.array([[0.0, 0.0], [0.2, 0.0], [0.2, 0.1], [0.0, 0.1]])
+    model = SurfaceModel(
+        "box", TRIANGLE, reference_point=(0.05, 0.02), outline=Polygon(corners[::order])
+    )
+    shown = outline_of(model)
+    assert {tuple(corner) for corner in shown.round(9)} == {
+        tuple(corner) for corner in (corners - [0.05, 0.02]).round(9)
+    }
+    x, y = shown.T
+    assert (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() > 0.0
 
 
 def test_the_program_writes_the_page_and_refuses_what_it_cannot_show(tmp_path, capsys):

@@ -43,7 +43,10 @@ _EPILOG = """\
 Parameters, remappings and the namespace are given as ROS arguments:
   --ros-args -p NAME:=VALUE --params-file FILE -r FROM:=TO -r __ns:=/NAMESPACE
 such as
-  --ros-args -p "model_files:=['/path/to/model.yaml']" -p normal_force:=5.0"""
+  --ros-args -p "model_files:=['/path/to/model.yaml']" -p normal_force:=5.0
+
+docs/tutorials/first_hour.md shows the nodes at work; README.md has tables of services, topics and
+types."""
 _ADDRESSED = (
     "parameters go to all nodes of the process; -p NODE:NAME:=VALUE, such as "
     '-p "limit_surface:model_files:=[...]", and parameter files address one'
