@@ -88,7 +88,7 @@ class SmallBatch(SupportSolver):
         x, y, z = normal
         length = sqrt(x * x + y * y + z * z)
         unit = (x / length, y / length, z / length)
-        starts: list[list[float]] = self._solver.starts_of(np.array(unit)).tolist()
+        beside = None
         if self._corners:
             found = self._by_corner(unit)
             if found is None:
@@ -100,12 +100,17 @@ class SmallBatch(SupportSolver):
             if exact:
                 x, y, z = point
                 return x / size, y / size, z / size
-            # A surface with corners is convex, and has one other start.
-            if _product(point, unit) > _product(starts[0], unit) * size:
-                starts = [list(point)]
+            beside = point, size
+        starts: list[Sequence[float]] = self._solver.starts_of(np.array(unit)).tolist()
+        # A surface with corners is convex, and has one other start.
+        if (
+            beside is not None
+            and _product(beside[0], unit) > _product(starts[0], unit) * beside[1]
+        ):
+            starts = [beside[0]]
         return self._highest(unit, starts)
 
-    def _highest(self, unit: Vector, starts: list[list[float]]) -> Vector | None:
+    def _highest(self, unit: Vector, starts: list[Sequence[float]]) -> Vector | None:
         """Return the highest of the points to which starts lead, None if one leads nowhere."""
         best = None
         most = 0.0
