@@ -41,6 +41,8 @@ BAD = 100
 LOST = 5.0
 # A stream ends so long before its load does [s].
 LAST = 0.5
+# Stamp [s] of wrenches that are sent before a stream begins.
+NEVER = 1_000_000
 # Every client of a service hears all of its answers; few would push its own out.
 DEEP = QoSProfile(depth=1000)
 
@@ -97,6 +99,33 @@ def _spinning(name: str, seconds: float) -> Iterator[Node]:
         node.destroy_node()
 
 
+def _wait_for_an_answer(node: Node, prefix: str, publisher: Any) -> None:
+    """Send wrenches until one is answered.
+
+    That the publisher knows of the subscription does not mean that the node knows of the
+    publisher already: on a busy machine that takes some tenths of a second, and what is sent
+    meanwhile is not lost, but was never received.
+    """
+    known = False
+
+    def note(_: TwistStamped) -> None:
+        nonlocal known
+        known = True
+
+    subscription = node.create_subscription(
+        TwistStamped, f"{prefix}/predicted_twist", note, DEEP
+    )
+    executor = EventsExecutor(context=node.context)
+    executor.add_node(node)
+    message = wrench_message(WRENCH)
+    message.header.stamp.sec = NEVER
+    while not known:
+        publisher.publish(message)
+        executor.spin_until_future_complete(Future(), timeout_sec=0.1)
+    executor.shutdown()
+    node.destroy_subscription(subscription)
+
+
 def stream(prefix: str, seconds: float, model_file: str | None) -> Stream:
     """Send wrenches at a steady rate, one in a hundred of them bad, and time the twists.
 
@@ -111,7 +140,7 @@ def stream(prefix: str, seconds: float, model_file: str | None) -> Stream:
         stamp = message.header.stamp
         start = due.pop((stamp.sec, stamp.nanosec), None)
         if start is None:
-            seen.unasked += 1
+            seen.unasked += stamp.sec != NEVER
         else:
             seen.answered += 1
             if expected is not None:
@@ -138,8 +167,7 @@ def stream(prefix: str, seconds: float, model_file: str | None) -> Stream:
     with _spinning("soak_stream", seconds) as node:
         node.create_subscription(TwistStamped, f"{prefix}/predicted_twist", take, DEEP)
         publisher = node.create_publisher(WrenchStamped, f"{prefix}/wrench", DEEP)
-        while not publisher.get_subscription_count():
-            time.sleep(0.01)
+        _wait_for_an_answer(node, prefix, publisher)
         end = time.perf_counter() + seconds - LAST
         node.create_timer(1.0 / RATE, send)
     return seen
