@@ -28,6 +28,9 @@ SLICE = 0.003
 # Rows of the first slice of all, of which it is learnt how long rows take; a batch of so many is
 # answered in one slice and waits for no other.
 FIRST_ROWS = 1024
+# Taking so many rows from the middleware, and giving the answer to it, takes a millisecond each:
+# others have a turn after the one and before the other.
+LARGE_ROWS = 100_000
 # Bytes of the requests that wait for their turn; what more come are refused.
 MOST_BYTES = 2**28
 
@@ -68,6 +71,8 @@ class Batches:
             return
         await self._wait_for_turn(24 * rows)
         try:
+            if rows > LARGE_ROWS:
+                await self._endpoints.give_way()
             counts = self._counts.setdefault(model, {})
             count, begin = counts.get(name, FIRST_ROWS), 0
             while begin < rows:
@@ -81,7 +86,7 @@ class Batches:
                 fits = int((end - begin) * SLICE / max(elapsed, 1e-6))
                 counts[name] = count = max(64, min(2 * count, fits))
                 begin = end
-                if begin < rows:
+                if begin < rows or rows > LARGE_ROWS:
                     await self._endpoints.give_way()
         finally:
             self._running = bool(self._queue)

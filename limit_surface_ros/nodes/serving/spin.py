@@ -27,6 +27,7 @@ from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
 from limit_surface_ros.errors import FileError, LimitSurfaceError, RangeError
+from limit_surface_ros.nodes.serving import middleware
 from limit_surface_ros.nodes.serving.settings import Setting, help_of
 from limit_surface_ros.runtime import keep_large_pieces
 
@@ -119,7 +120,8 @@ def run(
         if logs and not any(os.environ.get(name) for name in _HOMES):
             raise FileError(f"ROS 2 finds no place for its log: set one of {', '.join(_HOMES)}")
         rclpy.init(args=list(argv), signal_handler_options=SignalHandlerOptions.NO)
-        nodes = make_nodes()
+        with middleware.settings():
+            nodes = make_nodes()
         executor = _executor(nodes)
     except _CONFIGURATION_ERRORS as error:
         sentence = f"cannot start: {error}"

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Settings of Fast DDS, so that a stream does not wait for a message that a long answer displaced."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+# What Fast DDS 2 reads when the first node of a process is made, and the file that it finds by
+# itself; other middlewares look at neither.
+VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
+_FOUND = "DEFAULT_FASTRTPS_PROFILES.xml"
+
+
+@contextlib.contextmanager
+def settings() -> Iterator[None]:
+    """Name config/fastdds.xml to nodes that are made in the block, if the user names no file."""
+    file = None if os.environ.get(VARIABLE) or Path(_FOUND).exists() else _shipped()
+    if file is None:
+        yield
+        return
+    os.environ[VARIABLE] = str(file)
+    try:
+        yield
+    finally:
+        del os.environ[VARIABLE]
+
+
+def _shipped() -> Path | None:
+    with contextlib.suppress(PackageNotFoundError):
+        file = Path(get_package_share_directory("limit_surface_ros")) / "config" / "fastdds.xml"
+        return file if file.exists() else None
+    return None
