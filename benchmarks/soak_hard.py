@@ -36,7 +36,8 @@ def quantile(times: list[float], q: float) -> float:
 def long_batches(pool: ProcessPoolExecutor, prefix: str, seconds: float) -> tuple[str, bool]:
     """1 kHz of wrenches beside batches of a million rows in a closed loop.
 
-    Two batches before it give the process the memory that it keeps: fresh pages cost as much again.
+    Two batches before it give the process the memory that it keeps: fresh pages cost as much
+    again.
     """
     pool.submit(soak_load.batch_calls, prefix, 2, 1_000_000).result()
     batches = pool.submit(soak_load.batches, prefix, seconds + 1.0, 1_000_000)

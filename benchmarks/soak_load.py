@@ -112,9 +112,7 @@ def _wait_for_an_answer(node: Node, prefix: str, publisher: Any) -> None:
         nonlocal known
         known = True
 
-    subscription = node.create_subscription(
-        TwistStamped, f"{prefix}/predicted_twist", note, DEEP
-    )
+    subscription = node.create_subscription(TwistStamped, f"{prefix}/predicted_twist", note, DEEP)
     executor = EventsExecutor(context=node.context)
     executor.add_node(node)
     message = wrench_message(WRENCH)

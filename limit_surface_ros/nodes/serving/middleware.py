@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of Fast DDS, so that a stream does not wait for a message that a long answer displaced."""
+"""Settings of Fast DDS: a stream is not to wait for a message that a long answer displaced."""
 
 from __future__ import annotations
 
