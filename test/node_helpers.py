@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -81,3 +82,8 @@ class Program:
         """Wait for the end and return exit code and output."""
         output, _ = self.process.communicate(timeout=WAIT)
         return self.process.returncode, output
+
+
+def processor_ticks(pid: int) -> int:
+    """Return the processor time that a process has used, in user mode."""
+    return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11])

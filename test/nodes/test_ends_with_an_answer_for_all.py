@@ -22,7 +22,7 @@ from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_mod
 from limit_surface_ros.nodes.messages import convert
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.scaling import Scaling
-from node_helpers import Program, wrench_message
+from node_helpers import Program, processor_ticks, wrench_message
 from process_helpers import WAIT
 
 BATCHES = 20
@@ -111,3 +111,26 @@ def test_a_node_without_standard_streams_serves(ros, client_node, model_file):
         if process.poll() is None:
             process.kill()
             process.wait()
+
+
+def test_a_second_signal_refuses_what_has_begun(ros, client_node, tmp_path):
+    factors = np.random.default_rng(0).normal(size=(24, 3, 2))
+    surface = Dissipation(factors @ factors.transpose(0, 2, 1), Scaling(0.05, 2.0))
+    path = tmp_path / "slow.yaml"
+    write_surface_model(SurfaceModel(name="slow", surface=surface), path)
+    options = "-p", f"model_files:=['{path}']"
+    with Program("limit_surface_node", "--ros-args", *options) as program:
+        name = "/limit_surface/wrenches_to_twists"
+        client = client_node.create_client(WrenchesToTwists, name)
+        assert client.wait_for_service(timeout_sec=WAIT)
+        while not ros.done(client.call_async(WrenchesToTwists.Request()), 2.0):
+            pass
+        idle = processor_ticks(program.process.pid)
+        wrenches = np.random.default_rng(1).normal(size=(1_000_000, 3))
+        answered = client.call_async(WrenchesToTwists.Request(wrenches=convert.flat_of(wrenches)))
+        ros.wait(lambda: processor_ticks(program.process.pid) > idle + 30)
+        program.process.send_signal(signal.SIGINT)
+        code, output = program.end(signal.SIGTERM)
+    assert code == 0, output
+    assert ros.done(answered, WAIT)
+    assert answered.result().error_code == ErrorCode.UNAVAILABLE

@@ -37,7 +37,7 @@ from limit_surface_ros.nodes.messages import convert
 from limit_surface_ros.nodes.serving.answers import FiniteCheck
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.scaling import Scaling
-from node_helpers import Program, planar_twist, wrench_message
+from node_helpers import Program, planar_twist, processor_ticks, wrench_message
 from process_helpers import WAIT
 
 CODES = {
@@ -246,11 +246,6 @@ def test_a_client_that_dies_in_the_middle_of_a_call_harms_nobody(ros, client_nod
         assert call(WrenchesToTwists.Request(wrenches=flat)).error_code == ErrorCode.NONE
         code, output = program.end()
     assert code == 0, output
-
-
-def processor_ticks(pid: int) -> int:
-    """Return the processor time that a process has used, in user mode."""
-    return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11])
 
 
 def resident(pid: int) -> int:

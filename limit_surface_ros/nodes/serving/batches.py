@@ -88,6 +88,7 @@ class Batches:
                 begin = end
                 if begin < rows or rows > LARGE_ROWS:
                     await self._endpoints.give_way()
+            self._endpoints.last_large = time.monotonic()
         finally:
             self._running = bool(self._queue)
             if self._queue and not self._endpoints.ending:

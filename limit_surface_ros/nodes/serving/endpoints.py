@@ -12,6 +12,7 @@ from __future__ import annotations
 import collections
 import functools
 import inspect
+import math
 import time
 import traceback
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -132,6 +133,7 @@ class Endpoints:
         ending: Whether the node is about to end.
         when_ending: Called again and again with an error when the node ends, each time to refuse
             one of the requests that wait.
+        last_large: Steady time at which a long batch was answered last [s].
         last_request: Steady time at which a request came or was answered last [s].
 
     Args:
@@ -146,10 +148,12 @@ class Endpoints:
         self._health = health
         self._peers = peers
         self.ending = False
+        self._cut = False
         self._waiting: dict[str, collections.deque[Waiting]] = {}
         self.when_ending: list[Callable[[Exception], None]] = []
         self.under_way = 0
         self.last_request = 0.0
+        self.last_large = -math.inf
 
     def serve(self, service: Service) -> None:
         """Serve `~/name`."""
@@ -291,7 +295,13 @@ class Endpoints:
         return Output(publisher, answers.FiniteCheck(message_type, unbounded))
 
     async def give_way(self) -> None:
-        """Let whatever else is due have its turn."""
+        """Let whatever else is due have its turn.
+
+        Raises:
+            UnavailableError: The node ends, and there is no time to finish what has begun.
+        """
+        if self._cut:
+            raise _ending_error()
         turn = Waiting()
         self._node.executor.create_task(turn.settle)
         await turn
@@ -302,6 +312,10 @@ class Endpoints:
         for queue in self._waiting.values():
             for waiting in list(queue):
                 waiting.settle(_ending_error())
+
+    def cut(self) -> None:
+        """Refuse also what has begun, at its next pause."""
+        self._cut = True
 
     def refuse_next(self) -> None:
         """Refuse one of the requests that wait, of a node that ends.

@@ -9,6 +9,7 @@ end.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import signal
 import socket
@@ -57,11 +58,14 @@ _HOMES = ("ROS_LOG_DIR", "ROS_HOME", "HOME")
 # Requests may be on their way: so long after the last one [s], and no longer in all, a node that
 # ends refuses what comes, and one of those that wait at a time.
 QUIET, LONGEST_END, PACE = 0.2, 5.0, 0.02
+# What has begun is finished, unless it takes so long [s] or a second signal comes; then it is
+# refused.
+LONGEST_ANSWER = 60.0
 # Threads that prepare models give way to the node this often [s].
 SWITCH_INTERVAL = 5e-4
-# The middleware is still sending a large answer when the call is over; it is lost if the node is
-# gone before [s].
-TIME_TO_SEND = 0.3
+# The middleware is still sending an answer when the call is over, a large one in many pieces; it
+# is lost if the node is gone before [s].
+TIME_TO_SEND, TIME_TO_SEND_MUCH = 0.3, 3.0
 _LONG = 3600.0
 _LAST_STANDARD = 2
 EXECUTOR = Setting(
@@ -133,8 +137,10 @@ def run(
     for node in nodes:
         executor.add_node(node)
     _spin_until_woken(executor, woken, wakes)
-    _answer_what_waits(executor, [node.endpoints for node in nodes])
-    time.sleep(TIME_TO_SEND)
+    endpoints = [node.endpoints for node in nodes]
+    _answer_what_waits(executor, endpoints, woken)
+    much = max(each.last_large for each in endpoints) + TIME_TO_SEND_MUCH - time.monotonic()
+    time.sleep(max(TIME_TO_SEND, much))
     executor.shutdown()
     for node in nodes:
         node.destroy_node()
@@ -176,20 +182,39 @@ def _open_standard_streams() -> None:
     os.close(number)
 
 
-def _answer_what_waits(executor: Executor, endpoints: Sequence[Endpoints]) -> None:
+def _answer_what_waits(
+    executor: Executor, endpoints: Sequence[Endpoints], woken: socket.socket
+) -> None:
     """Finish answers that have begun, and refuse what has come or still comes."""
     for each in endpoints:
         each.end()
+    woken.setblocking(False)
     start = refused = time.monotonic()
-    while (now := time.monotonic()) - start < LONGEST_END:
+    cut = False
+    while True:
+        now = time.monotonic()
         if now - refused > PACE:
             refused = now
             for each in endpoints:
                 each.refuse_next()
+        under_way = any(each.under_way for each in endpoints)
         last = max(start, *(each.last_request for each in endpoints))
-        if now - last > QUIET and not any(each.under_way for each in endpoints):
+        if not under_way and (now - last > QUIET or now - start > LONGEST_END):
+            break
+        if not cut and (now - start > LONGEST_ANSWER or _again(woken)):
+            cut, start = True, now
+            for each in endpoints:
+                each.cut()
+        elif cut and now - start > LONGEST_END:
             break
         _spin_guarded(executor, PACE)
+
+
+def _again(woken: socket.socket) -> bool:
+    """Return whether another signal has come."""
+    with contextlib.suppress(BlockingIOError):
+        return any(woken.recv(64))
+    return False
 
 
 def _spin_until_woken(executor: Executor, woken: socket.socket, wakes: socket.socket) -> None:
