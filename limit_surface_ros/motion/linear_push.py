@@ -44,6 +44,7 @@ class LinearPush:
         rates: f, the state's change [m/s, m/s, rad/s, m/s], shape (..., 4).
         a: A = df/dx, shape (..., 4, 4).
         b: B = df/du, shape (..., 4, 2) for velocities, (..., 4, 3) for forces.
+        twists: Of the body at the origin of its frame, in that frame, shape (..., 3).
         modes: Places in `MODES`: 0 stick, 1 slide left, 2 slide right, 3 separate; shape (...).
         margins: Angles [rad] by which the velocity, or the force, can turn to the right, and to
             the left, before the mode is another, shape (..., 2).
@@ -54,6 +55,7 @@ class LinearPush:
     rates: Floats
     a: Floats
     b: Floats
+    twists: Floats
     modes: NDArray[np.intp]
     margins: Floats
     smooth: Bools
@@ -140,7 +142,8 @@ def linearise_push(
     body = _by_velocity(at, given) if kind == "velocity" else _by_force(at, given)
     # To the body's origin, and to the frame of the poses.
     turn = np.exp(1j * pose[:, 2])
-    moved = turn * contact_velocities(np.full(len(pose), -complex(*about)), body.twists)
+    own = contact_velocities(np.full(len(pose), -complex(*about)), body.twists)
+    moved = turn * own
     rates, a, b = np.empty((len(pose), 4)), np.zeros((len(pose), 4, 4)), body.by_input
     rates[:, 0], rates[:, 1] = moved.real, moved.imag
     rates[:, 2], rates[:, 3] = body.twists[:, 2], body.slips
@@ -154,6 +157,7 @@ def linearise_push(
         rates.reshape(*lead, 4),
         a.reshape(*lead, 4, 4),
         b.reshape(*lead, 4, count),
+        np.column_stack([own.real, own.imag, body.twists[:, 2]]).reshape(*lead, 3),
         body.modes.reshape(lead),
         body.margins.reshape(*lead, 2),
         (body.smooth & ~corner).reshape(lead),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Services of the `limit_surface` node that push bodies along paths."""
+"""Services of the `limit_surface` node that push bodies by their outlines."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
-from limit_surface_interfaces.srv import SimulatePush, SimulatePushes
+from limit_surface_interfaces.srv import LinearisePush, SimulatePush, SimulatePushes
 
 from limit_surface_ros.checks import as_floats
 from limit_surface_ros.errors import DataError, FrameError, RangeError, ShapeError
+from limit_surface_ros.motion.linear_push import INPUTS, linearise_push
 from limit_surface_ros.motion.outcomes import MODES
 from limit_surface_ros.motion.outline import Polygon
 from limit_surface_ros.motion.rollout import DEFAULT_ACCURACY, OVERLAPS, Pushing
@@ -48,7 +49,9 @@ async def simulate_one(
     model = node.host.models[request.model]
     tips, stamps = _tips(request)
     outline = outline_of(model, request)
-    stages = _pushing(node, model, outline, request).along(_planar_pose(request.start), tips)
+    stages = _pushing(node, model, outline, request).along(
+        _planar_pose("start", request.start), tips
+    )
     run = await in_turns(node.endpoints, stages)
     first = convert.nanoseconds(request.header.stamp)
     if stamps is None:
@@ -102,6 +105,31 @@ async def simulate_many(
     response.estimated_errors = convert.flat_of(runs.errors)
 
 
+def linearise(node: Any, request: LinearisePush.Request, response: LinearisePush.Response) -> None:
+    """Answer `~/linearise_push`."""
+    model, policy = node.host.models[request.model], node.input.policy
+    kinds = tuple(INPUTS)
+    if not 0 <= request.kind < len(kinds):
+        raise RangeError(f"kind must be VELOCITY (0) or FORCE (1), got {request.kind}")
+    found = linearise_push(
+        policy.surface_of(model),
+        outline_of(model, request),
+        request.friction,
+        _planar_pose("pose", request.pose),
+        convert.vector_components("contact", request.contact)[:2],
+        _rows("input", request.input, 1)[:, 0],
+        kind=kinds[request.kind],
+        reference_point=model.reference_point,
+    )
+    response.mode = _NUMBERS[MODES[int(found.modes)]]
+    response.rates = found.rates
+    response.a, response.b = found.a.ravel(), convert.flat_of(found.b)
+    response.turn_right, response.turn_left = found.margins.tolist()
+    response.smooth = bool(found.smooth)
+    convert.fill_twist(response.twist.twist, found.twists)
+    convert.fill_header(response.twist.header, request.header, policy.frame_of(model))
+
+
 def _pushing(node: Any, model: SurfaceModel, outline: Outline, request: Any) -> Pushing:
     """Return the body and the tip of a request."""
     return Pushing(
@@ -151,14 +179,14 @@ def _overlap(number: int) -> str:
     return OVERLAPS[number]
 
 
-def _planar_pose(pose: Pose) -> Floats:
+def _planar_pose(name: str, pose: Pose) -> Floats:
     """Return x, y and the angle of an upright pose."""
-    place = convert.vector_components("start.position", pose.position)
+    place = convert.vector_components(f"{name}.position", pose.position)
     q = pose.orientation
     turned = RigidTransform.from_quaternion(place, (q.x, q.y, q.z, q.w)).rotation
     if turned[2, 2] < UPRIGHT:
         raise RangeError(
-            "start must be upright: the z axes of its frame and the header's must agree"
+            f"{name} must be upright: the z axes of its frame and the header's must agree"
         )
     return np.array([place[0], place[1], np.arctan2(turned[1, 0], turned[0, 0])])
 
@@ -200,6 +228,7 @@ def _rows(name: str, numbers: array[float], columns: int) -> Floats:
 
 
 SERVICES = (
+    Service(LinearisePush, "linearise_push", linearise),
     Service(SimulatePush, "simulate_push", simulate_one),
     Service(SimulatePushes, "simulate_pushes", simulate_many),
 )
