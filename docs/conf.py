@@ -44,6 +44,9 @@ copybutton_prompt_is_regexp = True
 
 html_theme = "furo"
 html_title = "limit_surface_ros"
+html_static_path = ["_static"]
+html_css_files = ["pictures.css"]
+html_js_files = ["scroll.js"]
 html_theme_options = {"navigation_with_keys": True}
 
 # Docstrings are written to be read in the code: |x| is a norm there, `name` is code, and *.yaml is

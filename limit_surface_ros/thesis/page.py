@@ -39,6 +39,7 @@ nav ol { columns: 2 16rem; padding-left: 0; list-style: none; font-size: .9rem; 
 .claims b { white-space: nowrap; }
 .claims span { display: block; color: var(--soft); font-size: .92rem; }
 table { border-collapse: collapse; width: 100%; font-size: .9rem; }
+th { white-space: nowrap; }
 th, td { text-align: left; vertical-align: top; padding: .3rem .5rem .3rem 0;
   border-bottom: 1px solid var(--line); }
 td:last-child { white-space: nowrap; }
@@ -72,10 +73,10 @@ def page_of(records: Sequence[Record], subtitle: str) -> str:
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         "<title>The thesis's figures, rebuilt</title>\n"
         f"<style>{_STYLE}</style></head><body>\n"
-        "<h1>The thesis's figures, rebuilt from scratch</h1>\n"
+        "<header><h1>The thesis's figures, rebuilt from scratch</h1>\n"
         f"<p>{escape(subtitle)}</p>\n"
         f"<p>Of {len(claims)} claims of the text, {counts}. Each stands with its figure, in this "
-        "package's words, with what was measured.</p>\n"
+        "package's words, with what was measured.</p></header>\n"
         f"<nav><ol>\n{contents}</ol></nav>\n"
         f"<main>\n{_verdicts(records)}{figures}</main>\n"
         "</body></html>\n"
@@ -84,7 +85,7 @@ def page_of(records: Sequence[Record], subtitle: str) -> str:
 
 def claims_text(records: Sequence[Record]) -> str:
     """Return all claims as a table in Markdown: claim, what was measured, verdict."""
-    rows = ["| figure | the text says | measured | |", "|---|---|---|---|"]
+    rows = ["| figure | the text says | measured | verdict |", "|---|---|---|---|"]
     rows += [
         f"| {record.number} | {_cell(claim.said)} | {_cell(claim.measured)} | {claim.verdict} |"
         for record in records

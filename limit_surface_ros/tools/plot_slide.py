@@ -63,7 +63,8 @@ def parser() -> argparse.ArgumentParser:
         "--moment",
         type=float,
         required=True,
-        help="of inertia about the vertical axis through the centre of mass [kg m^2]",
+        help="of inertia about the vertical axis through the centre of mass [kg m^2]; of an even "
+        "box of sides a and b: mass (a^2 + b^2) / 12, of a disc: mass radius^2 / 2",
     )
     top.add_argument(
         "--centre",

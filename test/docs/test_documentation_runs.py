@@ -32,10 +32,11 @@ from limit_surface_ros.surface.sampling import random_motions
 from limit_surface_ros.surface.scaling import Scaling
 
 ROOT = Path(__file__).resolve().parents[2]
+README = ROOT / "README.md"
 STAND_IN = Path(__file__).with_name("ros2_stand_in.py")
 PAGES = sorted(
     path
-    for path in [ROOT / "README.md", *ROOT.glob("docs/**/*.md")]
+    for path in [README, *ROOT.glob("docs/**/*.md")]
     if path.exists() and not {"_build", "generated"} & set(path.relative_to(ROOT).parts)
 )
 # What the blocks before it print: compared, as `agree` says.
@@ -163,8 +164,8 @@ def own_files(tmp_path):
     rows = np.hstack([pairs.wrenches, pairs.twists])
     heading = "fx_N,fy_N,tau_Nm,vx,vy,omega"
     np.savetxt(folder / "pushes.csv", rows, delimiter=",", header=heading, comments="")
-    contact = f"schema: 1\nname: mine\npoints: {feet}\nfriction_limits: [1.0, 1.0, 1.0]\n"
-    (folder / "contact.yaml").write_text(contact)
+    shown = re.search(r"^```yaml\n(.*?)^```", README.read_text("utf-8"), re.MULTILINE | re.DOTALL)
+    (folder / "contact.yaml").write_text(shown[1])
     box = "<collision><geometry><box size='0.12 0.07 0.05'/></geometry></collision>"
     base = f"<link name='base'><inertial><mass value='0.4'/></inertial>{box}</link>"
     friction = "<gazebo reference='base'><mu1>0.35</mu1></gazebo>"
@@ -202,7 +203,7 @@ def test_every_code_block_of_a_page_runs_and_prints_what_is_shown(page, own_file
 
 FORMATS = [
     (page, match[1], match[2])
-    for page in (ROOT / "README.md", ROOT / "docs" / "reference" / "files.md")
+    for page in (README, ROOT / "docs" / "reference" / "files.md")
     for match in re.finditer(r"```(yaml|text)\n(.*?)```", page.read_text("utf-8"), re.DOTALL)
 ]
 
@@ -321,6 +322,18 @@ def test_brackets_in_commands_stand_in_quotes_as_zsh_wants_them(page):
         for command in commands_of(block.text):
             bare = re.sub(r"'[^']*'|\"[^\"]*\"|\s# .*|<<.*", "", command, flags=re.DOTALL)
             assert "[" not in bare, command
+
+
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "CONTRIBUTING.md"], ids=lambda page: page.stem)
+def test_links_to_files_lead_somewhere(page):
+    text = FENCE.sub("", page.read_text(encoding="utf-8"))
+    for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", text):
+        if not target.startswith("http"):
+            assert (page.parent / target).exists(), target
+
+
+def test_readme_is_shorter_than_220_lines():
+    assert len(README.read_text(encoding="utf-8").splitlines()) < 220
 
 
 def test_a_block_that_fails_fails_the_page(tmp_path, environment):
