@@ -39,10 +39,10 @@ TAIL_WEIGHT = 4.0
 # A coefficient of so many times the largest sample counts as much as one deviation of noise; of a
 # term that dies away within a step, one of this part of it does.
 LARGE_COEFFICIENT, SHORT_LIVED = 30.0, 1.0 / 3.0
-# Decays are kept between so many over the record, and so many over the shortest step.
+# Decays are kept between so many over the record, and so many over the first step.
 LEAST_DECAYS, MOST_DECAYS = 0.4, 3.0
-# Samples whose median step is the first.
-FIRST_STEPS = 5
+# Samples that tell on how many a term lives.
+FIRST_SAMPLES = 256
 MOST_CHANGE = 1.5
 # The search ends with a step that lowers the sum of squares by less than this part.
 LEAST_GAIN = 1e-7
@@ -119,8 +119,8 @@ class VariableProjection:
         self._tail_weight = self._allowed / samples.envelope
         steps = np.diff(samples.times)
         self._largest = float(np.abs(samples.values).max())
-        self._first_step = float(np.median(steps[:FIRST_STEPS]))
-        self._decays = samples.least_decays / samples.end, MOST_DECAYS / float(steps.min())
+        self._first = samples.times[samples.weights > 0.0][1 : FIRST_SAMPLES + 1]
+        self._decays = samples.least_decays / samples.end, MOST_DECAYS / float(steps[0])
         self._highest = np.pi / float(np.median(steps))
 
     def within_bounds(self, rates: Complexes) -> Complexes:
@@ -159,7 +159,9 @@ class VariableProjection:
     def _ridge(self, rates: Complexes) -> Floats:
         """Return the weights of the coefficients' own rows, shape (terms,)."""
         columns = np.where(rates.imag == 0.0, 1, 2)
-        shares = np.minimum(-rates.real * self._first_step, 1.0) / SHORT_LIVED
+        # All terms live on the first sample; a decay a at the step h on 1 / (a h) others.
+        others = np.exp(np.multiply.outer(rates.real, self._first)).sum(axis=1)
+        shares = 1.0 / (SHORT_LIVED * np.maximum(others, 1.0))
         return (1.0 / LARGE_COEFFICIENT + np.repeat(shares, columns)) / self._largest
 
     def improve(self, start: Projection, steps: int) -> Projection:

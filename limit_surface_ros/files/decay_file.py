@@ -65,7 +65,8 @@ class DecayModel:
         sum: The function x(t); it decays to zero, or to a constant if a rate is 0.
         time_span: Start and end [s] of the interval on which `max_error` holds.
         norm: What the coefficients minimise: "inf", "2", "1" or a name of the analyst's own.
-        max_error: Largest |x - response| on the time span, in the unit of x.
+        max_error: Largest |x - response| on the time span, of a record at its samples, in the unit
+            of x.
         system: The delay system whose roots the rates are, if they come from one.
         fit: How the model came about, as plain values for the file.
         tail: What is assumed of the response after the time span, and what the sum does there;
