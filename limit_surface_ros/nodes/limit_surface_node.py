@@ -52,6 +52,7 @@ services of limit_surface:
   ~/wrench_to_twist, ~/wrenches_to_twists      motions that loads cause
   ~/twist_to_wrench, ~/twists_to_wrenches      loads that motions need
   ~/push, ~/simulate_push, ~/simulate_pushes   what pushes do to the body
+  ~/linearise_push                             a push as a linear system, A and B
   ~/list_models, ~/describe_model, ~/reload    what is loaded
 topics of limit_surface:
   ~/wrench -> ~/predicted_twist, ~/predicted_twist_with_covariance
