@@ -2,10 +2,11 @@
 """How sure predicted twists are: held-out pushes in their regions, and the density they had.
 
 The sets and splits of `bench_real_pushes`. "auto" is the distribution that `--auto` stores, whose
-constants were fitted once to 32 sets; "constant of training" a Gaussian of one covariance from the
-training residuals; GP a Gaussian process of the residuals about f / |f| (scikit-learn, if it is
-there). A set's share is the mean over its splits. Densities are per steradian, as negative
-logarithms.
+constants were fitted once to 32 sets; "constant" a Gaussian about the same twists, of the one
+covariance (towards turning, and across) that the held-out pushes of its cross-validation have;
+"GP" a Gaussian process of the motion's residuals about f / |f|, one length for each part of the
+load, and noise (scikit-learn, if it is there). A set's share is the mean over its splits.
+Densities are per steradian, as negative logarithms.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+import warnings
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
@@ -20,6 +22,7 @@ from bench_real_pushes import SHARED, Split, splits
 
 from limit_surface_ros.fitting.few_pushes.automatic import fit_automatically
 from limit_surface_ros.fitting.few_pushes.calibration import squared_residuals
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.kinds.dissipation_scatter import (
     FREEDOM,
     UncertainSurface,
@@ -39,68 +42,89 @@ def judged(part: Split) -> dict[str, tuple[list[float], float]]:
     surface = result.surface
     scatter = scatter_of(result.details["uncertainty"], surface)
     squares = squared_residuals(scatter, surface, part.test)
-    unit = surface.scaling.twist_unit
-    units = surface.twist_of_wrench(part.test.wrenches) / unit
-    measured = part.test.twists / unit
-    measured = measured / np.linalg.norm(measured, axis=1, keepdims=True)
+    scale = surface.scaling.twist_unit
+    units = surface.twist_of_wrench(part.test.wrenches) / scale
+    measured = unit(part.test.twists / scale)
     plane = tangent_basis(units)
     residuals = log_map(units, measured, plane)
     angle = np.linalg.norm(residuals, axis=1)
-    onto_the_sphere = np.log(np.maximum(np.sin(angle), 1e-9) / np.maximum(angle, 1e-9))
+    onto_the_sphere = log_area(angle)
     determinant = np.linalg.det(scatter.plane_scale(units, plane))
     density = np.log(2.0 * np.pi) + 0.5 * np.log(determinant) + onto_the_sphere
     density = density + (0.5 * FREEDOM + 1.0) * np.log1p(squares / FREEDOM)
     found = {"auto": (shares(squares, region_quantile), float(density.mean()))}
-    fitted = log_map(*seen(surface, part))
-    spread = float(np.mean(fitted**2)) * 2.0
-    squares = angle**2 / spread
-    density = np.log(2.0 * np.pi * spread) + 0.5 * squares + onto_the_sphere
-    found["constant of training"] = (
-        shares(squares, lambda p: -2.0 * np.log(1.0 - p)),
-        float(density.mean()),
-    )
-    gaussian = gaussian_process(part, units, measured)
-    if gaussian is not None:
-        found["GP"] = gaussian
+    covariance = constant_covariance(result, part)
+    residuals = log_map(units, measured, turning_basis(units))
+    squares = np.einsum("ni,ij,nj->n", residuals, np.linalg.inv(covariance), residuals)
+    found["constant"] = gaussian(squares, np.linalg.det(covariance), onto_the_sphere)
+    process = gaussian_process(part, measured)
+    if process is not None:
+        found["GP"] = process
     return found
 
 
-def seen(surface, part: Split):
-    """Return predicted and measured unit twists of the training pairs, and tangent bases."""
-    unit = surface.scaling.twist_unit
-    units = surface.twist_of_wrench(part.training.wrenches) / unit
-    measured = part.training.twists / unit
-    return units, measured / np.linalg.norm(measured, axis=1, keepdims=True), tangent_basis(units)
+def unit(vectors):
+    """Return unit vectors."""
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
-def gaussian_process(part: Split, units, measured):
+def turning_basis(units):
+    """Return tangent bases whose first vector points towards turning, shape (n, 2, 3)."""
+    first = np.array([0.0, 0.0, 1.0]) - units[:, 2:] * units
+    # Any will do at pure turning.
+    first[np.linalg.norm(first, axis=1) < 1e-9] = [1.0, 0.0, 0.0]
+    first = unit(first)
+    return np.stack([first, np.cross(units, first)], axis=1)
+
+
+def constant_covariance(result, part: Split):
+    """Return the second moment of what the folds' models missed of the pushes they held out."""
+    surface, scale = result.surface, part.scaling.twist_unit
+    folds = scatter_of(result.details["uncertainty"], surface).folds
+    order = np.random.default_rng(0).permutation(len(part.training))
+    missed = []
+    for matrices, rows in zip(folds, np.array_split(order, len(folds)), strict=True):
+        held_out = part.training.take(rows)
+        of_fold = Dissipation(matrices, part.scaling)
+        units = of_fold.twist_of_wrench(held_out.wrenches) / scale
+        missed.append(log_map(units, unit(held_out.twists / scale), turning_basis(units)))
+    residuals = np.concatenate(missed)
+    return residuals.T @ residuals / len(residuals)
+
+
+def gaussian(squares, determinants, onto_the_sphere) -> tuple[list[float], float]:
+    """Return shares and mean negative log density of normal distributions in the plane."""
+    density = np.log(2.0 * np.pi) + 0.5 * (np.log(determinants) + squares) + onto_the_sphere
+    return shares(squares, lambda p: -2.0 * np.log(1.0 - p)), float(density.mean())
+
+
+def gaussian_process(part: Split, measured):
     """Return how a Gaussian process about f / |f| does; None without scikit-learn."""
     try:
         from sklearn.gaussian_process import GaussianProcessRegressor
         from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
     except ImportError:
         return None
-    load_unit, twist_unit = part.scaling.wrench_unit, part.scaling.twist_unit
-
-    def unit(vectors):
-        return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
-
-    loads, motions = (
-        unit(part.training.wrenches / load_unit),
-        unit(part.training.twists / twist_unit),
-    )
+    loads = unit(part.training.wrenches / part.scaling.wrench_unit)
+    motions = unit(part.training.twists / part.scaling.twist_unit)
     kernel = ConstantKernel(0.1) * RBF([1.0] * 3) + WhiteKernel(0.02)
     process = GaussianProcessRegressor(kernel, n_restarts_optimizer=1, random_state=0)
-    process.fit(np.vstack([loads, -loads]), np.vstack([motions - loads, loads - motions]))
-    queries = unit(part.test.wrenches / load_unit)
+    with warnings.catch_warnings():
+        # A length at its bound says that this part of the load does not count.
+        warnings.simplefilter("ignore")
+        # A load turned round turns the motion round.
+        process.fit(np.vstack([loads, -loads]), np.vstack([motions - loads, loads - motions]))
+    queries = unit(part.test.wrenches / part.scaling.wrench_unit)
     mean, spread = process.predict(queries, return_std=True)
-    variance = np.broadcast_to(np.atleast_2d(spread.T).T, (len(queries), 3)).mean(axis=1) ** 2
+    variance = np.mean(np.reshape(spread, (len(queries), -1)) ** 2, axis=1)
     predicted = unit(queries + mean)
     angle = np.linalg.norm(log_map(predicted, measured, tangent_basis(predicted)), axis=1)
-    squares = angle**2 / variance
-    onto_the_sphere = np.log(np.maximum(np.sin(angle), 1e-9) / np.maximum(angle, 1e-9))
-    density = np.log(2.0 * np.pi * variance) + 0.5 * squares + onto_the_sphere
-    return shares(squares, lambda p: -2.0 * np.log(1.0 - p)), float(density.mean())
+    return gaussian(angle**2 / variance, variance**2, log_area(angle))
+
+
+def log_area(angle):
+    """Return the logarithm of an area on the sphere in parts of that in the tangent plane."""
+    return np.log(np.maximum(np.sin(angle), 1e-9) / np.maximum(angle, 1e-9))
 
 
 def shares(squares, quantile) -> list[float]:

@@ -29,8 +29,9 @@ _INFINITY = float("inf")
 
 
 def counted(count: int, noun: str) -> str:
-    """Return a count with its noun, "1 pair" or "2 pairs", for messages."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+    """Return a count with its noun, "1 pair", "2 pairs" or "2 pushes", for messages."""
+    ending = "es" if noun.endswith(("s", "sh", "ch", "x")) else "s"
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}{ending}"
 
 
 def as_floats(name: str, values: ArrayLike) -> Floats:

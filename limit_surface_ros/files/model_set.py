@@ -79,10 +79,18 @@ class ModelSet(Generic[Model]):
         """Return the number of models."""
         return len(self._models)
 
-    def joined(self, models: Iterable[Model]) -> ModelSet[Model]:
-        """Return a set with these models behind; one of the same name takes the other's place."""
+    def joined(self, models: Iterable[Model], default: str = "") -> ModelSet[Model]:
+        """Return a set with these models behind; one of the same name takes the other's place.
+
+        Args:
+            models: What joins.
+            default: Name of the default model; empty: that of this set.
+
+        Raises:
+            UnknownModelError: The default is not among them.
+        """
         more = {model.name: model for model in models}
-        return ModelSet({**self._models, **more}, self.default, self._noun)
+        return ModelSet({**self._models, **more}, default or self.default, self._noun)
 
     def listed(self) -> str:
         """Return the names of the models for people: the first few, and how many more."""

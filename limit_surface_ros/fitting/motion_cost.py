@@ -148,6 +148,12 @@ class SmoothSupportSolver:
         self._place = np.zeros((2, count))
         self._hessian = np.zeros((3, count))
 
+    def begin_at(self, motions: Floats) -> None:
+        """Look for the motions of the first loads at known ones, shape (3, m)."""
+        count = motions.shape[1]
+        across = self.frame[1:, :, :count]
+        self._place[:, :count] = np.einsum("zcn,cn->zn", across, motions)
+
     def solve(self, matrices: Floats) -> None:
         """Find the motions under the model with these matrices, shape (k, 3, 3)."""
         forms = (matrices[:, _ROWS, _COLUMNS] @ self._lift).reshape(len(matrices), 6, -1)

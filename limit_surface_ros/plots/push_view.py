@@ -14,6 +14,7 @@ from limit_surface_ros.plots.canvas import (
     GREEN,
     GREY,
     ORANGE,
+    PURPLE,
     SKY,
     VERMILION,
     new_figure,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.motion.outline import Outline
     from limit_surface_ros.motion.rollout import PushRun
+    from limit_surface_ros.motion.spread import EndPoses
 
 # What stands for each mode, in every part of the picture.
 COLOURS = {
@@ -47,9 +49,17 @@ _WORDS = {
 _GHOSTS = 9
 # Length of the largest force, in mean radii of the outline.
 _ARROW = 0.8
+# Of the ellipse of an ensemble's ends.
+_PROBABILITY = 0.9
 
 
-def draw_push(run: PushRun, outline: Outline, tip_radius: float, title: str = "") -> Figure:
+def draw_push(
+    run: PushRun,
+    outline: Outline,
+    tip_radius: float,
+    title: str = "",
+    ends: EndPoses | None = None,
+) -> Figure:
     """Draw a push: the body's way on the left; its turn, modes and force over the path's length.
 
     Args:
@@ -57,13 +67,14 @@ def draw_push(run: PushRun, outline: Outline, tip_radius: float, title: str = ""
         outline: Of the body.
         tip_radius: Of the pusher [m].
         title: What to write above.
+        ends: Of an ensemble: the ellipse that holds 9 of 10 of them is drawn.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
     """
     with new_figure(8.0, 4.2) as figure:
         grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1.0))
-        _draw_way(figure.add_subplot(grid[:, 0]), run, outline, tip_radius)
+        _draw_way(figure.add_subplot(grid[:, 0]), run, outline, tip_radius, ends)
         _draw_turn(figure.add_subplot(grid[0, 1]), run)
         _draw_force(figure.add_subplot(grid[1, 1]), run)
         figure.suptitle(title or "a push along a path")
@@ -81,8 +92,10 @@ def _forces(run: PushRun) -> Floats:
     return np.stack([c * fx - s * fy, s * fx + c * fy], axis=1)
 
 
-def _draw_way(axes: Axes, run: PushRun, outline: Outline, tip_radius: float) -> None:
-    from matplotlib.patches import Circle
+def _draw_way(
+    axes: Axes, run: PushRun, outline: Outline, tip_radius: float, ends: EndPoses | None
+) -> None:
+    from matplotlib.patches import Circle, Polygon
 
     lengths = np.linspace(0.0, run.path_lengths[-1], _GHOSTS)
     for place, (length, pose) in enumerate(zip(lengths, run.poses_at(lengths), strict=True)):
@@ -114,6 +127,11 @@ def _draw_way(axes: Axes, run: PushRun, outline: Outline, tip_radius: float) -> 
                 point,
                 arrowprops={"arrowstyle": "->", "color": GREY, "linewidth": 0.8},
             )
+    if ends is not None:
+        axes.plot(*(1e3 * ends.poses[:, :2].T), ".", color=PURPLE, markersize=2)
+        border = 1e3 * ends.ellipse(_PROBABILITY).border()
+        label = f"{100.0 * _PROBABILITY:.0f} % of the ends"
+        axes.add_patch(Polygon(border, color=PURPLE, alpha=0.3, linewidth=0, label=label))
     axes.set_aspect("equal")
     axes.set_xlabel("x [mm]")
     axes.set_ylabel("y [mm]")

@@ -13,10 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.checks import counted
+from limit_surface_ros.errors import RangeError
 from limit_surface_ros.files.surface_file import write_surface_model
 from limit_surface_ros.files.yaml_reader import YAML_SUFFIXES
 from limit_surface_ros.fitting.search import AGREEMENT, process_pool
 from limit_surface_ros.fitting.workers import available_cores
+from limit_surface_ros.plots.calibration_view import draw_calibration
+from limit_surface_ros.plots.canvas import SUFFIXES, new_figure, save_figure
 from limit_surface_ros.tools.common.fit_options import (
     add_fit_options,
     add_frame_option,
@@ -25,7 +28,11 @@ from limit_surface_ros.tools.common.fit_options import (
 )
 from limit_surface_ros.tools.common.options import check_output, named_path, refuse_empty
 from limit_surface_ros.tools.common.program import program_parser, progress_bar, run_program
-from limit_surface_ros.tools.common.surface_fit import fit_model
+from limit_surface_ros.tools.common.surface_fit import (
+    CALIBRATION,
+    HELD_OUT_CALIBRATION,
+    fit_model,
+)
 from limit_surface_ros.tools.common.training_data import ACCEPTED, check_input
 
 if TYPE_CHECKING:
@@ -42,6 +49,8 @@ EXAMPLES = """examples:
   fit_surface pushes.mcap --wrench-topic wrench --motion-topic pose --auto --output model.yaml
 """
 
+# What pushes of a calibration are.
+PARTS = {"cross-validation": CALIBRATION, "held out": HELD_OUT_CALIBRATION}
 # Costs closer than this differ by rounding.
 NO_COST = 1e-12
 
@@ -57,6 +66,12 @@ def parser() -> argparse.ArgumentParser:
         "--name", help="the model's name; default: the contact's, or that of the output file"
     )
     add_frame_option(top)
+    top.add_argument(
+        "--picture",
+        type=Path,
+        help="picture of how many pushes the regions of --auto hold, "
+        f"{', '.join(SUFFIXES)}; optional",
+    )
     top.add_argument(
         "--workers",
         type=int,
@@ -88,8 +103,8 @@ def report(fitted: FittedModel, output: Path) -> None:
     print_errors("training", result.training)
     if result.held_out is not None:
         print_errors("held out", result.held_out)
-    if fitted.sureness:
-        print(f"scatter     {fitted.sureness}")
+    for label, text in fitted.sureness:
+        print(f"{label:<11} {text}")
     print(f"time        {result.wall_time:.2f} s")
     print(f"written     {output}")
 
@@ -123,6 +138,13 @@ def print_errors(label: str, errors: Errors) -> None:
 def run(options: argparse.Namespace) -> None:
     """Read, fit, write, report."""
     check_output(options.output, YAML_SUFFIXES, [options.input])
+    if options.picture is not None:
+        check_output(options.picture, SUFFIXES, [options.input])
+        if not options.auto:
+            raise RangeError("--picture is for --auto: other fits do not say how sure they are")
+        with new_figure(1.0, 1.0):
+            # Without matplotlib this ends here, and not after the fit.
+            pass
     refuse_empty(options, ["name", "frame_id"])
     check_fit_options(options)
     refuse_options_of_others(parser(), options, [check_input(options.input)])
@@ -133,6 +155,16 @@ def run(options: argparse.Namespace) -> None:
         )
     command = shlex.join(["fit_surface", *options.command])
     write_surface_model(fitted.model, options.output, header=f"Made by: {command}")
+    if options.picture is not None:
+        curves = {
+            label: fitted.model.fit[key]
+            for label, key in (
+                ("cross-validation", CALIBRATION),
+                ("held out", HELD_OUT_CALIBRATION),
+            )
+            if key in fitted.model.fit
+        }
+        save_figure(draw_calibration(curves), options.picture)
     report(fitted, options.output)
     for doubt in fitted.description.doubts:
         warnings.warn(f"{options.input}: {doubt}", stacklevel=2)

@@ -7,7 +7,7 @@ import argparse
 import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from limit_surface_ros.files.contact_file import read_contact
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.files.yaml_reader import read_yaml
 from limit_surface_ros.motion.rollout import DEFAULT_ACCURACY, OVERLAPS, simulate_push
+from limit_surface_ros.motion.spread import push_spread
 from limit_surface_ros.plots.canvas import save_figure
 from limit_surface_ros.plots.film import FILMS
 from limit_surface_ros.plots.push_view import draw_push, write_film
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.motion.outline import Outline
     from limit_surface_ros.surface.base import LimitSurface
+    from limit_surface_ros.surface.kinds.dissipation_scatter import UncertainSurface
 
 EPILOG = """\
 MODEL is a model file with the key `outline`, or a contact file whose shape has a rim. The path is
@@ -46,6 +48,9 @@ examples:
 """
 
 
+_MOST_MEMBERS = 10_000
+
+
 class Body(NamedTuple):
     """What a file says of a body that is pushed."""
 
@@ -53,6 +58,7 @@ class Body(NamedTuple):
     surface: LimitSurface
     outline: Outline
     reference_point: Floats
+    uncertain: UncertainSurface | None = None
 
 
 def parser() -> argparse.ArgumentParser:
@@ -97,6 +103,14 @@ def parser() -> argparse.ArgumentParser:
         help="of tip and body at the start: taken as an offset, or pushed out (%(default)s)",
     )
     top.add_argument(
+        "--members",
+        type=int,
+        default=0,
+        metavar="N",
+        help="push N surfaces, too, that the scatter of a model of `fit_surface --auto` allows, "
+        "and draw the ellipse of 9 of 10 ends",
+    )
+    top.add_argument(
         "--animate", type=Path, metavar="FILM", help=f"film to write too: {', '.join(FILMS)}"
     )
     top.add_argument(
@@ -115,17 +129,17 @@ def read_body(path: Path) -> Body:
     if "kind" in read_yaml(path):
         model = read_surface_model(path)
         name, surface, outline = model.name, model.surface, model.outline
-        about = np.array(model.reference_point)
+        about, uncertain = np.array(model.reference_point), model.uncertain
     else:
         contact = read_contact(path)
         name, surface, outline = contact.name, contact.surface, contact.outline
-        about = contact.reference_point
+        about, uncertain = contact.reference_point, None
     if outline is None:
         raise DataError(
             f"{path}: has no outline for a tip to touch: add `outline`, such as "
             "`outline: {kind: rectangle, size: [0.1, 0.06]}`"
         )
-    return Body(name, surface, outline, about)
+    return Body(name, surface, outline, about, uncertain)
 
 
 def default_path(outline: Outline, pose: Floats, radius: float) -> Floats:
@@ -141,28 +155,32 @@ def default_path(outline: Outline, pose: Floats, radius: float) -> Floats:
 def run(options: argparse.Namespace) -> None:
     """Read, simulate, say, draw."""
     check_picture(options, [options.model])
-    check_ranges(options, {"seconds": (0.1, 120.0)})
+    check_ranges(options, {"seconds": (0.1, 120.0), "members": (0, _MOST_MEMBERS)})
     if options.animate is not None:
         check_output(options.animate, FILMS, [options.model])
     if options.path is not None and (len(options.path) < 4 or len(options.path) % 2):
         raise RangeError("--path takes two or more corners, each an x and a y")
     body = read_body(options.model)
+    if options.members and body.uncertain is None:
+        raise DataError(
+            f"{options.model}: does not say how far pushes scatter; --members is for models of "
+            "`fit_surface --auto`"
+        )
     pose = np.array(options.pose)
     if options.path is None:
         path = default_path(body.outline, pose, options.tip_radius)
     else:
         path = np.array(options.path).reshape(-1, 2)
-    found = simulate_push(
-        body.surface,
-        body.outline,
-        options.tip_radius,
-        options.friction,
-        pose,
-        path,
-        accuracy=options.accuracy,
-        overlap=options.overlap,
-        reference_point=body.reference_point,
-    )
+    push = (body.outline, options.tip_radius, options.friction, pose, path)
+    settings: dict[str, Any] = {
+        "accuracy": options.accuracy,
+        "overlap": options.overlap,
+        "reference_point": body.reference_point,
+    }
+    found = simulate_push(body.surface, *push, **settings)
+    ends = None
+    if options.members and body.uncertain is not None:
+        ends = push_spread(body.uncertain.members(options.members), *push, **settings)
     # Rounded to what is printed, and without the sign of zero.
     x, y = np.round(found.end_pose[:2], 6) + 0.0
     angle = round(math.degrees(found.end_pose[2]), 4) + 0.0
@@ -176,9 +194,18 @@ def run(options: argparse.Namespace) -> None:
     print(f"modes       {', '.join(modes)}")
     print(f"end         x {x:.6f} m, y {y:.6f} m, angle {angle:.4f} deg")
     print(f"error       about {max(found.error, 1e-15):.1g} m, by {found.evaluations} evaluations")
+    if ends is not None:
+        large, small = 1e3 * ends.ellipse(0.9).half_axes
+        turns = np.degrees(np.quantile(ends.poses[:, 2], (0.05, 0.95)))
+        print(
+            f"spread      9 of 10 ends in an ellipse of half-axes {large:.2f} and {small:.2f} mm, "
+            f"angles from {turns[0]:.2f} to {turns[1]:.2f} deg"
+        )
     title = f"{body.name}, friction {options.friction:g}"
     save_figure(
-        draw_push(found, body.outline, options.tip_radius, title), options.output, options.dpi
+        draw_push(found, body.outline, options.tip_radius, title, ends),
+        options.output,
+        options.dpi,
     )
     print(f"written     {options.output}")
     if options.animate is not None:

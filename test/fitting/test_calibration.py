@@ -6,11 +6,16 @@ import pytest
 
 from limit_surface_ros.fitting.few_pushes.automatic import fit_automatically
 from limit_surface_ros.fitting.few_pushes.calibration import (
-    calibrated_scatter,
+    calibrate,
+    inside_regions,
     squared_residuals,
 )
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
-from limit_surface_ros.surface.kinds.dissipation_scatter import region_quantile, scatter_of
+from limit_surface_ros.surface.kinds.dissipation_scatter import (
+    region_probability,
+    region_quantile,
+    scatter_of,
+)
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.sampling import random_directions, random_loads
@@ -53,7 +58,7 @@ def test_the_scale_follows_the_residuals_of_the_folds():
         loads = surface.wrench_of_twist(units * surface.scaling.twist_unit)
         noisy = units + angle * np.random.default_rng(2).normal(size=units.shape)
         held_out = Pairs(loads, noisy * surface.scaling.twist_unit)
-        return calibrated_scatter(surface, [surface] * 2, [held_out] * 2).log_scale
+        return calibrate(surface, [surface] * 2, [held_out] * 2).scatter.log_scale
 
     # One sphere has no curvature that differs by direction: e^g a^2 I is all there is.
     narrow, wide = scale_of(0.02), scale_of(0.2)
@@ -79,3 +84,13 @@ def test_a_turned_body_has_turned_covariances():
     spread = np.sqrt(np.trace(expected, axis1=1, axis2=2))
     found = np.sqrt(np.trace(scales[1], axis1=1, axis2=2))
     assert np.median(np.abs(found / spread - 1.0)) < 0.1
+
+
+def test_a_push_lies_inside_of_the_regions_above_its_level():
+    regions = np.array([0.1, 0.5, 0.9, 0.99])
+    levels = region_probability(np.array([region_quantile(each) for each in regions]))
+    np.testing.assert_allclose(levels, regions)
+    told = inside_regions(np.array([0.02, 0.48, 0.52, 0.97]))
+    assert told["pushes"] == 4
+    shares = dict(zip(told["regions"], told["inside"], strict=True))
+    assert (shares[0.05], shares[0.5], shares[0.55], shares[0.95]) == (0.25, 0.5, 0.75, 0.75)

@@ -1,13 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """A surface that learns while the robot pushes: better with each push, and it can forget."""
 
+import copy
+
 import numpy as np
 import pytest
 
 from limit_surface_ros.errors import DataError, NotFiniteError, RangeError, ZeroVectorError
+from limit_surface_ros.fitting.few_pushes.calibration import squared_residuals
 from limit_surface_ros.fitting.few_pushes.online import OnlineSurface
 from limit_surface_ros.fitting.few_pushes.segments import Segments
+from limit_surface_ros.fitting.few_pushes.window import Window
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.dissipation_scatter import (
+    UncertainSurface,
+    region_quantile,
+)
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.kinds.polynomial import MONOMIALS, Polynomial
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
@@ -96,6 +104,42 @@ def test_outliers_are_borne_and_reversed_pushes_turned_away():
     assert [update.accepted for update in updates].count(False) == 2
     assert dirty.refused == {"its power is not positive": 2}
     assert angle(dirty) < angle(clean) + 1.5
+
+
+@pytest.mark.parametrize("forgetting", [1.0, "blend"])
+def test_what_is_learnt_says_how_sure_it_is(forgetting):
+    online = OnlineSurface(SPHERE, forgetting=forgetting)
+    learnt(online, pushes(5))
+    assert online.surface_and_scatter()[1] is None
+    sizes, unseen = [], pushes(400, 7)
+    for seed in (1, 2):
+        learnt(online, pushes(12, seed))
+        surface, scatter = online.surface_and_scatter()
+        np.testing.assert_array_equal(surface.matrices, online.surface().matrices)
+        axes = UncertainSurface(surface, scatter).twist_with_covariance(unseen.wrenches).half_axes
+        sizes.append(np.median(axes))
+    assert sizes[1] < sizes[0]
+    inside = squared_residuals(scatter, surface, unseen) <= region_quantile(0.9)
+    assert 0.8 < inside.mean() < 0.98
+
+
+def test_folds_are_near_what_was_learnt_without_their_pushes():
+    window, pairs = Window(SPHERE, 50, 1.0), pushes(28)
+    loads, motions = pairs.wrenches / SCALING.wrench_unit, pairs.twists / SCALING.twist_unit
+    motions = motions / np.linalg.norm(motions, axis=1, keepdims=True)
+    for count, (load, motion) in enumerate(zip(loads, motions, strict=True), start=1):
+        if count == 26:
+            without = copy.deepcopy(window)
+        window.learn(load, motion, count)
+    (fold,) = window.folds(8, [np.arange(-3, 0)])
+    whole, expected, found = (
+        each.twist_of_wrench(TEST.wrenches) / SCALING.twist_unit
+        for each in (window.surface(8), without.surface(8), fold)
+    )
+    expected, found = (expected - whole).ravel(), (found - whole).ravel()
+    size = np.linalg.norm(found) / np.linalg.norm(expected)
+    assert 0.5 < size < 1.5
+    assert expected @ found > 0.7 * size * (expected @ expected)
 
 
 def test_a_state_is_restored():

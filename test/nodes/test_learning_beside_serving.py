@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import multiprocessing
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,6 +16,7 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import TwistStamped, WrenchStamped
 from limit_surface_interfaces.msg import ErrorCode
 from limit_surface_interfaces.srv import ListModels, WrenchToTwist
+from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
 from limit_surface_ros.errors import FileError, UnknownModelError
@@ -21,6 +25,7 @@ from limit_surface_ros.files.surface_file import (
     read_surface_model,
     write_surface_model,
 )
+from limit_surface_ros.motion.outline import Polygon
 from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
@@ -33,6 +38,7 @@ SCALING = Scaling(0.08, 5.0)
 BODY = PointContacts([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]], [2.0, 1.0, 1.5], SCALING)
 SHIFTED = PointContacts([[0.0, -0.04], [0.0, 0.08], [0.12, -0.04]], [2.0, 1.0, 1.5], SCALING)
 REFERENCE = (0.02, -0.01)
+OUTLINE = Polygon([(-0.05, -0.05), (0.09, -0.05), (-0.05, 0.09)])
 
 
 @pytest.fixture
@@ -40,7 +46,8 @@ def prior(tmp_path):
     """A model file of a wrong prior, about a point off its frame's origin."""
     path = tmp_path / "prior.yaml"
     sphere = Dissipation(np.eye(3)[None], SCALING)
-    write_surface_model(SurfaceModel("body", sphere, reference_point=REFERENCE), path)
+    model = SurfaceModel("body", sphere, reference_point=REFERENCE, outline=OUTLINE)
+    write_surface_model(model, path)
     return path
 
 
@@ -123,6 +130,8 @@ def test_predictions_improve_follow_a_change_and_outlive_the_node(
     refused = save(Trigger.Request())
     assert not refused.success
     assert "nothing has been learnt yet" in refused.message
+    # The name stands for the prior until there is a push.
+    assert angles(call, "body_learnt", some(BODY)) == angles(call, "body", some(BODY))
     robot = Robot(ros, client_node)
     robot.push(node, BODY, 12, 1)
     before, learnt = (angles(call, name, some(BODY)) for name in ("body", "body_learnt"))
@@ -132,6 +141,9 @@ def test_predictions_improve_follow_a_change_and_outlive_the_node(
     assert names == ["body", "body_learnt"]
     assert "12 pushes" in node.describe()["learning"]
     assert "predicted within" in node.describe()["last push"]
+    assert "mean of 10" in node.describe()["last pushes"]
+    asked = WrenchToTwist.Request(model="body_learnt", wrench=wrench_message((9.0, 1.0, 0.1)))
+    assert call(asked).has_covariance
     # What is learnt outlives a reload, and the node.
     reload = ros.client(client_node, Trigger, "/limit_surface/reload")
     assert reload(Trigger.Request()).success
@@ -140,6 +152,12 @@ def test_predictions_improve_follow_a_change_and_outlive_the_node(
     assert answer.success, answer.message
     model = read_surface_model(saved)
     assert (model.name, model.reference_point) == ("body_learnt", REFERENCE)
+    np.testing.assert_array_equal(model.outline.drawn(), OUTLINE.drawn())
+    # What is learnt can be the default, as long as it is served.
+    assert node.set_parameters([Parameter("default_model", value="body_learnt")])[0].successful
+    assert angles(call, "", some(BODY)) == pytest.approx(learnt, abs=1e-6)
+    assert reload(Trigger.Request()).success
+    assert node.host.models.default == "body_learnt"
     again = ros.add(LimitSurfaceNode, files=[prior], parameters=parameters, namespace="/again")
     ros.wait(lambda: again.learner.count == 12)
     # The body is another one half-way.
@@ -156,6 +174,34 @@ def test_a_node_that_does_not_learn_has_no_such_topics(ros, client_node, prior):
     assert "learning" not in node.describe()
 
 
+def test_learning_goes_on_when_its_process_is_killed(ros, client_node, prior):
+    before = set(multiprocessing.active_children())
+    node = ros.add(LimitSurfaceNode, files=[prior], parameters={"learn": True})
+    robot = Robot(ros, client_node)
+    robot.push(node, BODY, 6, 1)
+    (process,) = set(multiprocessing.active_children()) - before
+    process.kill()
+    robot.push(node, BODY, 2, 2)
+    assert node.learner.count >= 8
+    assert node.health.reported["learning"] == 1
+
+
+def test_measurements_that_teach_nothing_do_no_harm(ros, client_node, prior):
+    node = ros.add(LimitSurfaceNode, files=[prior], parameters={"learn": True})
+    robot = Robot(ros, client_node)
+    robot.push(node, BODY, 1, 1)
+    # Not a number in the midst of a push; a twist that is late; a clock that is turned back.
+    for _ in range(4):
+        robot.sample((5.0, 0.0, 0.0), (0.02, 0.0, 0.0))
+    robot.sample((np.nan, 0.0, 0.0), (0.02, np.nan, 0.0))
+    ros.wait(lambda: node.health.refused["measured_twist", "NOT_FINITE"] == 1)
+    robot.twists.publish(twist_message((0.02, 0.0, 0.0), stamp=Time(sec=99)))
+    ros.wait(lambda: node.health.reported["measured twist without a wrench"] == 1)
+    robot.time = 1.0
+    robot.push(node, BODY, 1, 2)
+    assert node.learner.count >= 2
+
+
 def test_what_learning_cannot_begin_with_is_refused(ros, prior, tmp_path):
     with pytest.raises(UnknownModelError, match="no model 'absent'"):
         ros.add(
@@ -167,3 +213,18 @@ def test_what_learning_cannot_begin_with_is_refused(ros, prior, tmp_path):
             files=[prior],
             parameters={"learn": True, "learn_file": str(prior)},
         )
+    model = read_surface_model(prior)
+    for state, reference, message in (
+        ({"version": 1, "pushes": [[1.0, 2.0]]}, REFERENCE, "fit: online: this is no state"),
+        ({"version": 1, "pushes": []}, (0.0, 0.0), "was learnt in frame 'object' about"),
+    ):
+        saved = tmp_path / "saved.yaml"
+        write_surface_model(
+            replace(model, fit={"online": state}, reference_point=reference), saved
+        )
+        with pytest.raises(FileError, match=message):
+            ros.add(
+                LimitSurfaceNode,
+                files=[prior],
+                parameters={"learn": True, "learn_file": str(saved)},
+            )

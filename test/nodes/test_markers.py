@@ -89,6 +89,19 @@ def test_a_body_that_sticks_shows_no_motion():
     assert markers.arc_marker(CANVAS, still).action == Marker.DELETE
 
 
+def test_the_cone_is_a_fan_to_the_border_of_the_region():
+    twists = np.array([[1.0, 0.1, 3.0], [0.9, 0.3, -2.0], [0.8, -0.2, 1.0]])
+    corners = rows(markers.cone_marker(CANVAS, twists)).reshape(-1, 3, 3)
+    # Once for each side from which it may be seen.
+    assert len(corners) == 2 * len(twists)
+    ends = 0.05 * twists[:, :2]
+    for triangle, number in zip(corners[:3], range(3), strict=True):
+        np.testing.assert_allclose(triangle[0], 0.0)
+        np.testing.assert_allclose(triangle[1:, :2], [ends[number], ends[(number + 1) % 3]])
+    assert not corners[:, :, 2].any()
+    assert markers.cone_marker(CANVAS, np.empty((0, 3))).action == Marker.DELETE
+
+
 def test_contacts_are_shown_where_they_are_known():
     points = np.array([[0.0, 0.1], [0.2, 0.0]])
     known = SurfaceModel("feet", PointContacts(points, [1.0, 3.0]))

@@ -96,6 +96,24 @@ def test_covariances_do_not_depend_on_the_size_or_the_sense_of_a_load(seed):
     np.testing.assert_allclose(answer.half_axes, axes, rtol=1e-6)
 
 
+@pytest.mark.parametrize("probability", [0.5, 0.9])
+def test_the_border_of_a_region_is_as_far_as_its_half_axes(probability):
+    uncertain, load = model(2), loads(1)[0]
+    answer = uncertain.twist_with_covariance(load[None], probability)
+    twists = uncertain.border(load, probability, 360)
+    units, centre = twists / SCALING.twist_unit, answer.twist[0] / SCALING.twist_unit
+    np.testing.assert_allclose(np.linalg.norm(units, axis=1), 1.0)
+    angles = np.arccos(units @ centre)
+    farthest = np.array([angles.max(), angles.min()])
+    np.testing.assert_allclose(farthest, answer.half_axes[0], rtol=1e-3)
+    # A residual on the border is at the quantile.
+    plane = tangent_basis(np.tile(centre, (360, 1)))
+    residuals = log_map(np.tile(centre, (360, 1)), units, plane)
+    inverse = np.linalg.inv(uncertain.scatter.plane_scale(centre[None], plane[:1])[0])
+    squares = np.einsum("ni,ij,nj->n", residuals, inverse, residuals)
+    np.testing.assert_allclose(squares, region_quantile(probability), rtol=1e-6)
+
+
 def test_one_load_is_looked_up_close_to_what_many_are_worked_out_as():
     uncertain, some = model(3), loads(300)
     many = uncertain.twist_with_covariance(some, probability=0.5)

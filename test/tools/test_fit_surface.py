@@ -15,7 +15,9 @@ import pytest
 from limit_surface_ros.files.pushes_csv import read_pushes
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.fitting.few_pushes.bootstrap import surfaces_of
+from limit_surface_ros.fitting.few_pushes.calibration import squared_residuals
 from limit_surface_ros.fitting.result import Errors, FitResult
+from limit_surface_ros.surface.kinds.dissipation_scatter import region_quantile
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.measures import mean_angle
 from limit_surface_ros.surface.sampling import random_motions
@@ -135,6 +137,27 @@ def test_the_automatic_fit_stores_its_choice_and_its_bootstrap(pushes, tmp_path)
     assert answer.covariance.shape == (3, 3)
     assert 0.0 < answer.half_axes[1] <= answer.half_axes[0]
     assert len(surfaces_of(model.fit["bootstrap"], model.surface.scaling)) == 3
+
+
+def test_the_automatic_fit_tells_how_many_pushes_its_regions_hold(pushes, tmp_path, capsys):
+    pytest.importorskip("matplotlib", reason="matplotlib draws the pictures")
+    output, picture = tmp_path / "model.yaml", tmp_path / "calibration.png"
+    arguments = [str(pushes), "-o", str(output), "--picture", str(picture), "--rows", "0-15"]
+    assert main(arguments) == 2
+    assert "--picture is for --auto" in capsys.readouterr().err
+    assert main([*arguments, "--auto", "--folds", "2"]) == 0
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    model, rest = read_surface_model(output), read_pushes(pushes).rest(range(16))
+    stored = model.fit["held_out_calibration"]
+    squares = squared_residuals(model.uncertain.scatter, model.surface, rest)
+    inside = [np.mean(squares <= region_quantile(region)) for region in stored["regions"]]
+    np.testing.assert_allclose(stored["inside"], inside, atol=1e-4)
+    told = {region: 100.0 * share for region, share in zip(stored["regions"], inside, strict=True)}
+    expected = f"hold {told[0.5]:.0f} / {told[0.9]:.0f} / {told[0.95]:.0f} % of {len(rest)} pushes"
+    printed = capsys.readouterr().out
+    assert f"50 / 90 / 95 % regions {expected} not seen, of those held out" in printed
+    assert f"% of {model.fit['calibration']['pushes']} pushes not seen\n" in printed
+    assert model.fit["calibration"]["pushes"] == 16
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,8 @@ from limit_surface_ros.files.decay_file import read_decay_model
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
 from limit_surface_ros.motion.outline import Polygon
 from limit_surface_ros.plots.decay_view import draw_decay
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.dissipation_scatter import TwistScatter
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 from limit_surface_ros.tools import (
@@ -198,6 +200,24 @@ def test_plot_push_says_where_the_body_ends_and_draws_its_way(tmp_path, pushed_f
     assert "end         x 0.020000 m, y 0.000000 m, angle 0.0000 deg" in printed
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert film.read_bytes().startswith(b"GIF8")
+
+
+def test_plot_push_draws_where_members_of_a_scatter_end(tmp_path, pushed_file, capsys):
+    assert plot_push.main([str(pushed_file), "--members", "5"]) == 2
+    assert "does not say how far pushes scatter" in capsys.readouterr().err
+    matrices = np.stack([np.diag([1.0, 1.0, 2.0]), np.diag([1.0, 1.0, 0.2])])
+    scatter = TwistScatter(matrices, (matrices,) * 3)
+    model = SurfaceModel(
+        "box",
+        Dissipation(matrices, Scaling(0.05, 1.0)),
+        fit={"uncertainty": scatter.stored()},
+        outline=Polygon([[-0.05, -0.03], [0.05, -0.03], [0.05, 0.03], [-0.05, 0.03]]),
+    )
+    path, picture = tmp_path / "box.yaml", tmp_path / "push.svg"
+    write_surface_model(model, path)
+    assert plot_push.main([str(path), "--members", "8", "-o", str(picture)]) == 0
+    assert "spread      9 of 10 ends in an ellipse of half-axes" in capsys.readouterr().out
+    assert "90 % of the ends" in picture.read_text()
 
 
 def test_plot_push_without_a_path_pushes_from_the_left(tmp_path, pushed_file, capsys):

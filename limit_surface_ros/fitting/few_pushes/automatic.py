@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from limit_surface_ros.fitting.few_pushes.bootstrap import bootstrap, stored_surfaces
-from limit_surface_ros.fitting.few_pushes.calibration import calibrated_scatter
+from limit_surface_ros.fitting.few_pushes.calibration import calibrate
 from limit_surface_ros.fitting.few_pushes.cross_validation import cross_validate
 from limit_surface_ros.fitting.few_pushes.mixture import choose_mixture, usual_mixture
 from limit_surface_ros.fitting.few_pushes.recipe import ROBUST_SCALE, VELOCITY_WEIGHT, FitContext
@@ -39,7 +39,8 @@ def fit_automatically(
     """Fit a mixture of dissipation models to recorded pushes, and how its twists scatter.
 
     The result's details hold the mean angle of every part and of the mixture on held-out pushes,
-    and under "uncertainty" what `surface.kinds.dissipation_scatter.scatter_of` reads.
+    under "uncertainty" what `surface.kinds.dissipation_scatter.scatter_of` reads, and under
+    "calibration" which shares of the held-out pushes lie inside of which regions.
 
     Args:
         pairs: Recorded pushes.
@@ -73,7 +74,7 @@ def fit_automatically(
     mixture = choose_mixture(held_out, usual)
     surface, parts = mixture.fit(FitContext(pairs, scaling, support, seed=search.seed))
     of_folds = [mixture.of_fold(fold, recipes) for fold in held_out]
-    scatter = calibrated_scatter(surface, of_folds, [fold.held_out for fold in held_out])
+    calibration = calibrate(surface, of_folds, [fold.held_out for fold in held_out])
     predicted = [
         angle_error(of_fold, fold.held_out)
         for of_fold, fold in zip(of_folds, held_out, strict=True)
@@ -85,7 +86,8 @@ def fit_automatically(
             if all(fold.surfaces[row] is not None for fold in held_out)
         }
         | {"mixture": _degrees(float(np.concatenate(predicted).mean()))},
-        "uncertainty": scatter.stored(),
+        "uncertainty": calibration.scatter.stored(),
+        "calibration": calibration.summary(),
     }
     if refits:
         surfaces = bootstrap(

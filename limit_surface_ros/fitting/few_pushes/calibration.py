@@ -8,7 +8,8 @@ distribution about 0. A t bounds what an outlier weighs.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from limit_surface_ros.surface.kinds.dissipation_scatter import (
     FREEDOM,
     TwistScatter,
     log_map,
+    region_probability,
     tangent_basis,
 )
 
@@ -29,12 +31,32 @@ if TYPE_CHECKING:
 # Standard deviation of g among the sets that its distribution was fitted to.
 _SPREAD = 0.35
 _ITERATIONS = 50
+# Probabilities of the regions whose shares of pushes a fit tells.
+REGIONS = tuple(round(0.05 * k, 2) for k in range(1, 20))
 
 
-def calibrated_scatter(
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """The scatter of a model's twists, and what the pushes that folds held out make of it.
+
+    Attributes:
+        scatter: Of the model of all pushes.
+        levels: Of each held-out push, the probability of the smallest region that holds it, by
+            the model that did not see it, shape (n,).
+    """
+
+    scatter: TwistScatter
+    levels: Floats
+
+    def summary(self) -> dict[str, Any]:
+        """Return plain values for a model file; see `inside_regions`."""
+        return inside_regions(self.levels)
+
+
+def calibrate(
     surface: Dissipation, folds: Sequence[Dissipation], held_out: Sequence[Pairs]
-) -> TwistScatter:
-    """Return the scatter of a model's twists.
+) -> Calibration:
+    """Return the scatter of a model's twists, and how it holds the pushes of the folds.
 
     Args:
         surface: The model of all pushes.
@@ -45,11 +67,30 @@ def calibrated_scatter(
         DataError: There are fewer than two folds.
     """
     matrices = tuple(fold.matrices for fold in folds)
-    squares = [
-        squared_residuals(TwistScatter(fold.matrices, matrices), fold, pairs)
-        for fold, pairs in zip(folds, held_out, strict=True)
-    ]
-    return TwistScatter(surface.matrices, matrices, _log_scale(np.concatenate(squares)))
+    squares = np.concatenate(
+        [
+            squared_residuals(TwistScatter(fold.matrices, matrices), fold, pairs)
+            for fold, pairs in zip(folds, held_out, strict=True)
+        ]
+    )
+    scale = _log_scale(squares)
+    levels = region_probability(np.exp(-scale) * squares)
+    return Calibration(TwistScatter(surface.matrices, matrices, scale), levels)
+
+
+def held_out_levels(scatter: TwistScatter, surface: Dissipation, pairs: Pairs) -> Floats:
+    """Return the probability of the smallest region that holds each push, shape (n,)."""
+    return region_probability(squared_residuals(scatter, surface, pairs))
+
+
+def inside_regions(levels: Floats) -> dict[str, Any]:
+    """Return how many pushes there are, and which shares of them lie inside `REGIONS`."""
+    shares = np.mean(levels <= np.array(REGIONS)[:, None], axis=1)
+    return {
+        "pushes": len(levels),
+        "regions": list(REGIONS),
+        "inside": [round(float(share), 4) for share in shares],
+    }
 
 
 def squared_residuals(scatter: TwistScatter, surface: Dissipation, pairs: Pairs) -> Floats:

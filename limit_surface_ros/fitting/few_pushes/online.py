@@ -14,33 +14,41 @@ import numpy as np
 
 from limit_surface_ros.checks import as_directions, as_floats
 from limit_surface_ros.errors import DataError, LimitSurfaceError, RangeError
+from limit_surface_ros.fitting.few_pushes.calibration import calibrate
 from limit_surface_ros.fitting.few_pushes.mixture import ELLIPSOID, as_dissipation, mixed
-from limit_surface_ros.fitting.few_pushes.recipe import ROBUST_SCALE, FitContext
+from limit_surface_ros.fitting.few_pushes.recipe import FEWEST_PAIRS, FitContext
 from limit_surface_ros.fitting.few_pushes.window import Window
-from limit_surface_ros.fitting.motion_cost import direction_loss
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.dissipation_scatter import FREEDOM
 from limit_surface_ros.surface.pairs import Pairs
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
-    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.checks import Floats, Places
     from limit_surface_ros.surface.base import LimitSurface
+    from limit_surface_ros.surface.kinds.dissipation_scatter import TwistScatter
 
 # Share of the window's ellipsoid up to so many pushes, and pushes from which on it has none.
 _ELLIPSOID_SHARE, _ELLIPSOID_UNTIL, _ELLIPSOID_GONE = 0.3, 10, 25
 # How much larger the prior's losses count: a little, so that a wrong one is left soon, for a right
 # one is hard to tell from luck with the first few pushes.
 _DISTRUST = 1.25
-# What a past loss counts with every push, how sharply losses are told apart, and the weight below
-# which a model is left out.
-_DISCOUNT, _SHARPNESS, _NEGLIGIBLE = 0.9, 24.0, 0.02
+# What past evidence counts with every push, and the weight below which a model is left out.
+_DISCOUNT, _NEGLIGIBLE = 0.9, 0.02
+# Scale of the errors of predictions [rad], by which evidence is told apart: about that of pushes.
+_ERROR = float(np.radians(7.0))
 # Forgetting of the younger window where two are blended.
-_YOUNGER = 0.87
+_YOUNGER = 0.8
+# Evidence for the younger window at which the other one begins anew with the pushes that gave it,
+# and how many of them there must be: by chance alone it comes once in exp(5) = 150 pushes at most.
+_LEAD, _FEWEST_YOUNGER = 5.0, 5
 # Terms of a prior beyond which it is not mixed into the surface that is served.
 _MOST_PRIOR_TERMS = 16
+# Of the jackknife that tells what the pushes leave open.
+_FOLDS = 5
 _VERSION = 1
 
 
@@ -86,7 +94,8 @@ class OnlineSurface:
                 friction force of the right order.
             window: How many pushes are kept.
             forgetting: Weight of a push relative to the next; or "blend", two windows, of which
-                one forgets, blended by how well each predicts.
+                one forgets, blended by how well each predicts; the other begins anew where that
+                one has predicted better for some time.
 
         Raises:
             RangeError: The window is shorter than two pushes, or the forgetting out of (0, 1].
@@ -108,6 +117,8 @@ class OnlineSurface:
         self._wrenches = np.empty((0, 3))
         self._twists = np.empty((0, 3))
         self._losses = np.zeros(1 + len(rates))
+        # Evidence for the younger window, and of how many pushes it is.
+        self._lead, self._led = 0.0, 0
         self.count = 0
         self.refused: dict[str, int] = {}
 
@@ -146,13 +157,15 @@ class OnlineSurface:
             self.refused[reason] = self.refused.get(reason, 0) + 1
             return Update(False, reason, angle, prior_angle)
         cosines = np.array([float(each @ motion) for each in predicted])
-        losses = 2.0 * direction_loss(np.minimum(cosines, 1.0), ROBUST_SCALE)[0]
+        losses = _surprises(cosines)
         self._losses = _DISCOUNT * self._losses + losses
         self.count += 1
         self._wrenches = np.vstack([self._wrenches, pair.wrenches])[-self._window :]
         self._twists = np.vstack([self._twists, pair.twists])[-self._window :]
         for window in self._windows:
             window.learn(load, motion, self.count)
+        if len(self._windows) > 1:
+            self._look_for_a_change(float(losses[1] - losses[2]))
         return Update(True, "", angle, prior_angle)
 
     def surface(self, terms: int = 8) -> LimitSurface:
@@ -161,25 +174,26 @@ class OnlineSurface:
         Args:
             terms: That sum up the contacts of a window.
         """
-        if not self.count:
-            return self._prior
-        weights = self._weights()
-        parts: list[tuple[float, LimitSurface]] = []
-        prior = self._prior_terms()
-        if weights[0] > _NEGLIGIBLE and prior is not None:
-            parts.append((float(weights[0]), prior))
-        for weight, window in zip(weights[1:].tolist(), self._windows, strict=True):
-            if weight > _NEGLIGIBLE:
-                parts.append((weight, window.surface(terms)))
-        if not parts:
-            parts = [(1.0, self._windows[0].surface(terms))]
-        share = self._ellipsoid_share()
-        ellipsoid = self._ellipsoid() if share > 0.0 else None
-        total = sum(weight for weight, _ in parts) / (1.0 - share if ellipsoid else 1.0)
-        parts = [(weight / total, surface) for weight, surface in parts]
-        if ellipsoid is not None:
-            parts.append((share, ellipsoid))
-        return mixed(parts)
+        return self._mixture().surface(terms) if self.count else self._prior
+
+    def surface_and_scatter(self, terms: int = 8) -> tuple[LimitSurface, TwistScatter | None]:
+        """Return `surface`, and how far pushes scatter about its twists, as `--auto` has it.
+
+        The folds of the jackknife are what one step makes of the contacts without a fifth of the
+        pushes each; None before there are six pushes.
+        """
+        if self.count < FEWEST_PAIRS:
+            return self.surface(terms), None
+        mixture = self._mixture()
+        surface = mixture.surface(terms)
+        kept = len(self._wrenches)
+        # By when they came: which fold a push is in does not change with those that come.
+        numbers = np.arange(self.count - kept, self.count) % _FOLDS
+        parts = [np.flatnonzero(numbers == fold) for fold in range(_FOLDS)]
+        folds = mixture.folds(terms, [part - kept for part in parts])
+        pairs = self.pairs()
+        held_out = [pairs.take(part) for part in parts]
+        return surface, calibrate(surface, folds, held_out).scatter
 
     def pairs(self) -> Pairs:
         """Return the pushes of the window, the oldest first.
@@ -215,22 +229,57 @@ class OnlineSurface:
             DataError: The state is of another version or form.
         """
         online = cls(prior, window, forgetting)
-        try:
-            if state["version"] != _VERSION:
-                raise DataError(f"the state has version {state['version']}, read is {_VERSION}")
-            rows = as_floats("pushes", state["pushes"]).reshape(-1, 6)
-            for row in rows:
-                online.add(row[:3], row[3:])
-        except (KeyError, TypeError, ValueError) as error:
-            raise DataError(f"this is no state of a learnt surface: {error}") from None
+        pairs = pushes_of_state(state)
+        for wrench, twist in zip(pairs.wrenches, pairs.twists, strict=True):
+            online.add(wrench, twist)
         return online
+
+    def _mixture(self) -> _Mixture:
+        """Return what is mixed now, with its weights."""
+        weights = self._weights()
+        known: list[tuple[float, LimitSurface]] = []
+        prior = self._prior_terms()
+        if weights[0] > _NEGLIGIBLE and prior is not None:
+            known.append((float(weights[0]), prior))
+        windows = [
+            (weight, window)
+            for weight, window in zip(weights[1:].tolist(), self._windows, strict=True)
+            if weight > _NEGLIGIBLE
+        ]
+        if not known and not windows:
+            windows = [(1.0, self._windows[0])]
+        share = self._ellipsoid_share()
+        ellipsoid = self._ellipsoid() if share > 0.0 else None
+        if ellipsoid is not None:
+            total = sum(weight for weight, _ in (*known, *windows))
+            known.append((total * share / (1.0 - share), ellipsoid))
+        return _Mixture(known, windows)
+
+    def _look_for_a_change(self, evidence: float) -> None:
+        """Let the window that keeps all forget what was before a change.
+
+        Page's test (1954, doi:10.1093/biomet/41.1-2.100): evidence for the younger window is
+        summed up, from nothing again wherever the sum falls below it.
+
+        Args:
+            evidence: Of the last push, the difference of logarithms of densities.
+        """
+        self._lead += evidence
+        self._led += 1
+        if self._lead <= 0.0:
+            self._lead, self._led = 0.0, 0
+        elif self._lead > _LEAD and self._led >= _FEWEST_YOUNGER:
+            self._windows[0].begin_anew(self._windows[1], self._led)
+            self._wrenches, self._twists = self._wrenches[-self._led :], self._twists[-self._led :]
+            self._losses[1] = self._losses[2]
+            self._lead, self._led = 0.0, 0
 
     def _weights(self) -> Floats:
         """Return how much each model counts: the prior, and the windows."""
         if not self.count:
             return np.asarray(np.eye(len(self._losses))[0])
         losses = self._losses * np.array([_DISTRUST] + [1.0] * len(self._windows))
-        weights = np.exp(-_SHARPNESS * (losses - losses.min()))
+        weights = np.exp(losses.min() - losses)
         if self._prior_terms() is None:
             weights[0] = 0.0
             if not weights.any():
@@ -267,6 +316,65 @@ class OnlineSurface:
         except LimitSurfaceError:
             # Too few pushes, or all of one kind: there is none yet.
             return None
+
+
+def pushes_of_state(state: Mapping[str, Any]) -> Pairs:
+    """Return the pushes that `OnlineSurface.state` holds, the oldest first.
+
+    Raises:
+        DataError: The state is of another version or form.
+    """
+    try:
+        if state["version"] != _VERSION:
+            raise DataError(f"the state has version {state['version']}, read is {_VERSION}")
+        rows = as_floats("pushes", state["pushes"]).reshape(-1, 6)
+        return Pairs(rows[:, :3], rows[:, 3:])
+    except DataError:
+        raise
+    except (KeyError, TypeError, ValueError) as error:
+        raise DataError(f"this is no state of a learnt surface: {error}") from None
+
+
+@dataclass(frozen=True)
+class _Mixture:
+    """What is mixed into the surface that is served.
+
+    Attributes:
+        known: Surfaces that are in it as they are, with their weights.
+        windows: Those of which a few terms are in it, with their weights.
+    """
+
+    known: list[tuple[float, LimitSurface]]
+    windows: list[tuple[float, Window]]
+
+    def surface(self, terms: int) -> Dissipation:
+        """Return the mixture with the windows summed up in so many terms each."""
+        return self._mixed(window.surface(terms) for _, window in self.windows)
+
+    def folds(self, terms: int, folds: Sequence[Places]) -> list[Dissipation]:
+        """Return the mixtures that do not know some of the pushes; see `Window.folds`."""
+        if not self.windows:
+            return [self._mixed(())] * len(folds)
+        of_windows = [window.folds(terms, folds) for _, window in self.windows]
+        return [self._mixed(each) for each in zip(*of_windows, strict=True)]
+
+    def _mixed(self, surfaces: Iterable[LimitSurface]) -> Dissipation:
+        weights = [weight for weight, _ in self.windows]
+        parts = [*self.known, *zip(weights, surfaces, strict=True)]
+        total = sum(weight for weight, _ in parts)
+        return mixed((weight / total, surface) for weight, surface in parts)
+
+
+def _surprises(cosines: Floats) -> Floats:
+    """Return negative logarithms of the density of motions, but for a constant, shape (n,).
+
+    Errors follow the t distribution of `dissipation_scatter`, of which an outlier costs little.
+
+    Args:
+        cosines: Of the angles between predicted and measured motions.
+    """
+    squares = np.maximum(2.0 - 2.0 * cosines, 0.0) / _ERROR**2
+    return np.asarray((0.5 * FREEDOM + 1.0) * np.log1p(squares / FREEDOM))
 
 
 def _blended(predictions: list[Floats], weights: Floats) -> Floats:

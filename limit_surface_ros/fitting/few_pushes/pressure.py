@@ -26,7 +26,7 @@ from limit_surface_ros.fitting.motion_cost import MotionCost
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.checks import Bools, Floats, Places
     from limit_surface_ros.fitting.pairs import ScaledPairs
     from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 
@@ -132,17 +132,28 @@ class SmallContacts:
 
     def loaded(self) -> SmallContacts:
         """Return those whose friction counts."""
-        carry = self.limits > _NEGLIGIBLE * self.limits.max()
-        return SmallContacts(self.points[carry], self.limits[carry], self.radii[carry])
+        return self.take(self.carrying())
+
+    def carrying(self) -> Bools:
+        """Return which contacts' friction counts, shape (k,)."""
+        return np.asarray(self.limits > _NEGLIGIBLE * self.limits.max())
+
+    def take(self, which: Bools) -> SmallContacts:
+        """Return some of them."""
+        return SmallContacts(self.points[which], self.limits[which], self.radii[which])
 
     def merged(self, count: int) -> SmallContacts:
-        """Return at most `count` contacts that stand for them all.
+        """Return at most `count` contacts that stand for them all; see `groups`."""
+        return self.summed(self.groups(count))
 
-        Two contacts become one at their centre of friction, with the moment of both, so that
-        total, centre and spread of the friction stay. Those go first that widen the least (Ward
-        1963, doi:10.1080/01621459.1963.10500845).
+    def groups(self, count: int) -> Places:
+        """Return which of at most `count` groups each contact belongs to, shape (k,).
+
+        Those become one group first that widen the least (Ward 1963,
+        doi:10.1080/01621459.1963.10500845).
         """
-        points, limits, radii = self.points.copy(), self.limits.copy(), self.radii.copy()
+        points, limits = self.points.copy(), self.limits.copy()
+        members = np.arange(len(limits))
         kept = np.ones(len(limits), dtype=bool)
         away = points[:, None] - points
         shared = np.multiply.outer(limits, limits) / np.add.outer(limits, limits)
@@ -152,9 +163,9 @@ class SmallContacts:
             first, second = divmod(int(widening.argmin()), len(limits))
             both = [first, second]
             total = limits[both].sum()
-            moment = limits[both] @ radii[both] ** 2 + widening[first, second]
             points[first] = limits[both] @ points[both] / total
-            limits[first], radii[first] = total, np.sqrt(moment / total)
+            limits[first] = total
+            members[members == second] = first
             kept[second] = False
             # Only what is about these two changes: a patch has a thousand contacts.
             away = points[first] - points
@@ -162,7 +173,23 @@ class SmallContacts:
             row[~kept] = row[first] = np.inf
             widening[first], widening[:, first] = row, row
             widening[second], widening[:, second] = np.inf, np.inf
-        return SmallContacts(points[kept], limits[kept], radii[kept])
+        return np.asarray(np.searchsorted(np.flatnonzero(kept), members))
+
+    def summed(self, groups: Places) -> SmallContacts:
+        """Return one contact for each group, at its centre of friction and with its moment.
+
+        So total, centre and spread of the friction stay.
+        """
+        count = int(groups.max()) + 1
+
+        def total(values: Floats) -> Floats:
+            return np.asarray(np.bincount(groups, self.limits * values, count))
+
+        limits = total(np.ones(len(groups)))
+        points = np.stack([total(axis) / limits for axis in self.points.T], axis=1)
+        away = self.points - points[groups]
+        moments = total(self.radii**2 + np.sum(away**2, axis=1))
+        return SmallContacts(points, limits, np.sqrt(moments / limits))
 
 
 def _rings(count: int) -> Floats:

@@ -19,6 +19,7 @@ that was driven to zero; a window can.
 
 from __future__ import annotations
 
+import copy
 import math
 from typing import TYPE_CHECKING
 
@@ -31,7 +32,9 @@ from limit_surface_ros.fitting.pairs import ScaledPairs
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 
 if TYPE_CHECKING:
-    from limit_surface_ros.checks import Floats
+    from collections.abc import Sequence
+
+    from limit_surface_ros.checks import Floats, Places
     from limit_surface_ros.surface.base import LimitSurface
     from limit_surface_ros.surface.scaling import Scaling
 
@@ -45,6 +48,8 @@ _STEPS = 4
 # steps a push that the new ones take.
 _FIRST_PLACING, _PLACING_EVERY, _PLACING_STEPS = 6, 4, 3
 _FARTHEST_STEP = 2.0
+# Logarithm of the share of the largest limit below which a contact is left out.
+_IDLE = math.log(1e-3)
 _DAMPING, _LEAST_DAMPING, _MORE, _LESS = 0.03, 1e-4, 5.0, 0.4
 
 
@@ -78,10 +83,7 @@ class Window:
         """Take a push in, and let the contacts follow."""
         self._loads = np.vstack([self._loads, load])[-self._length :]
         self._motions = np.vstack([self._motions, motion])[-self._length :]
-        ages = np.arange(len(self._loads))[::-1]
-        pairs = ScaledPairs(
-            self._loads, self._motions, self._scaling, self._forgetting ** ages.astype(np.float64)
-        )
+        pairs = self._pairs()
         self._fit.follow(pairs, _STEPS)
         if self._challenger is not None:
             self._challenger.follow(pairs, _PLACING_STEPS)
@@ -94,23 +96,55 @@ class Window:
             self._challenged = count
             self._challenger.follow(pairs, _PLACING_STEPS)
 
+    def begin_anew(self, other: Window, kept: int) -> None:
+        """Keep only the last few pushes, and go on from the contacts of another window.
+
+        Args:
+            other: Of the same pushes.
+            kept: How many of the last are kept.
+        """
+        self._loads, self._motions = self._loads[-kept:], self._motions[-kept:]
+        self._fit, self._challenger = copy.copy(other._fit), None
+
     def motion(self, load: Floats) -> Floats:
         """Return the unit motion of one scaled load."""
         return self._fit.motion(load)
 
     def surface(self, terms: int) -> Dissipation:
         """Return the contacts summed up in so many terms."""
-        contacts = self._fit.contacts.loaded().merged(terms)
-        return Dissipation(contacts.matrices, self._scaling)
+        return Dissipation(self._fit.contacts.loaded().merged(terms).matrices, self._scaling)
+
+    def folds(self, terms: int, folds: Sequence[Places]) -> list[Dissipation]:
+        """Return what the surface would be without some of the pushes, by one step from it.
+
+        Args:
+            terms: That sum up the contacts, the same ones as in `surface`.
+            folds: Pushes that each leaves out, as places counted back from the last one, -1.
+        """
+        contacts = self._fit.contacts
+        loaded = contacts.carrying()
+        groups = contacts.take(loaded).groups(terms)
+        count = len(self._loads)
+        parts = [count + places[places >= -count] for places in folds]
+        surfaces = []
+        for limits in self._fit.limits_without(self._pairs(), parts):
+            fold = SmallContacts(contacts.points, limits, contacts.radii).take(loaded)
+            surfaces.append(Dissipation(fold.summed(groups).matrices, self._scaling))
+        return surfaces
+
+    def _pairs(self) -> ScaledPairs:
+        ages = np.arange(len(self._loads))[::-1].astype(np.float64)
+        return ScaledPairs(self._loads, self._motions, self._scaling, self._forgetting**ages)
 
 
 class _Fit:
     """Friction limits of contacts that follow a window by damped Gauss-Newton steps."""
 
     def __init__(self, usual: SmallContacts) -> None:
-        self._usual = usual
+        self._usual, self._total = usual, float(usual.limits.sum())
         self._speeds = usual.speeds
         self._parameters = np.log(usual.limits)
+        self._motions = np.empty((3, 0))
         self._damping = _DAMPING
         self.cost = math.inf
 
@@ -127,59 +161,119 @@ class _Fit:
         return np.asarray(motion / np.linalg.norm(motion))
 
     def follow(self, pairs: ScaledPairs, steps: int) -> None:
-        """Take steps towards the minimum over these pairs."""
-        solver = SmoothSupportSolver(np.ascontiguousarray(pairs.wrenches.T))
-        directions = np.ascontiguousarray(pairs.directions.T)
-        here = self._evaluate(self._parameters, solver, directions, pairs.weights)
+        """Take steps towards the minimum over these pairs, of which one is new."""
+        self._drop_idle()
+        errors = _Errors(pairs, self._motions)
+        self.cost = self._cost(self._parameters, errors)
+        equations: tuple[Floats, Floats] | None = None
         for _ in range(steps):
-            cost, hessian, slope = here
+            if equations is None:
+                equations = self._normal_equations(errors)
+            hessian, slope = equations
             damped = hessian + self._damping * np.eye(len(slope))
             step = np.clip(-np.linalg.solve(damped, slope), -_FARTHEST_STEP, _FARTHEST_STEP)
-            trial = self._parameters + step
-            there = self._evaluate(trial, solver, directions, pairs.weights)
-            if there[0] < cost:
-                self._parameters, here = trial, there
+            cost = self._cost(self._parameters + step, errors)
+            if cost < self.cost:
+                self._parameters = self._parameters + step
+                self.cost = cost
                 self._damping = max(_LESS * self._damping, _LEAST_DAMPING)
+                equations = None
             else:
                 self._damping *= _MORE
-        self.cost = here[0]
+        self._motions = errors.motions
+
+    def limits_without(self, pairs: ScaledPairs, parts: Sequence[Places]) -> list[Floats]:
+        """Return the limits that fit all pairs but a part of them, by one Gauss-Newton step."""
+        errors = _Errors(pairs, self._motions)
+        self._cost(self._parameters, errors)
+        hessian, slope = self._normal_equations(errors)
+        hessian = hessian + _LEAST_DAMPING * np.eye(len(slope))
+        rows, residuals = errors.rows()
+        # Each pair has a row for its size, and three for its direction.
+        rows = rows.reshape(len(slope), 4, -1)
+        residuals = residuals.reshape(4, -1)
+        found = []
+        for part in parts:
+            its = rows[:, :, part].reshape(len(slope), -1)
+            rest = hessian - its @ its.T
+            step = -np.linalg.solve(rest, slope - its @ residuals[:, part].ravel())
+            found.append(np.exp(self._parameters + np.clip(step, -_FARTHEST_STEP, _FARTHEST_STEP)))
+        return found
+
+    def _drop_idle(self) -> None:
+        """Leave out contacts that carry next to nothing: their slopes are gone with them."""
+        carry = self._parameters > self._parameters.max() + _IDLE
+        if not carry.all():
+            self._usual = self._usual.take(carry)
+            self._speeds, self._parameters = self._speeds[carry], self._parameters[carry]
 
     def _matrices(self, parameters: Floats) -> Floats:
         return np.asarray(self._speeds * np.exp(2.0 * parameters)[:, None, None])
 
-    def _evaluate(
-        self,
-        parameters: Floats,
-        solver: SmoothSupportSolver,
-        directions: Floats,
-        weights: Floats,
-    ) -> tuple[float, Floats, Floats]:
-        """Return the cost, the Gauss-Newton Hessian (halved) and the slope (halved)."""
-        limits = np.exp(parameters)
-        matrices = self._matrices(parameters)
-        solver.solve(matrices)
-        motions, speeds, dissipation = solver.motions, solver.speeds, solver.dissipation
-        norms = np.sqrt(np.einsum("cn,cn->n", motions, motions))
-        units = motions / norms
-        chords = units - directions
-        cosines = np.einsum("cn,cn->n", units, directions)
-        log_factors = -np.log(dissipation)
-        loss, _ = direction_loss(cosines, ROBUST_SCALE)
-        surprise = np.log(limits / self._usual.limits)
-        cost = float(weights @ (log_factors**2 + 2.0 * loss))
-        entropy = limits @ surprise - limits.sum() + self._usual.limits.sum()
-        cost += _ENTROPY_WEIGHT * float(entropy)
-        # Loads of the contacts, and how each turns the motion.
-        parts = (matrices.reshape(-1, 3) @ motions).reshape(-1, 3, len(weights))
-        parts /= speeds[:, None]
-        turned = solver.response(parts) / norms
-        turned -= np.einsum("kcn,cn->kn", turned, units)[:, None] * units
-        robust = 2.0 * ROBUST_SCALE / np.sqrt(np.sum(chords**2, axis=0) + ROBUST_SCALE**2)
-        of_size, of_chord = np.sqrt(weights), np.sqrt(weights * robust)
-        of_direction = (turned * of_chord).reshape(len(limits), -1)
-        rows = np.concatenate([-speeds / dissipation * of_size, of_direction], axis=1)
-        residuals = np.concatenate([log_factors * of_size, (chords * of_chord).ravel()])
+    def _cost(self, parameters: Floats, errors: _Errors) -> float:
+        limits, usual = np.exp(parameters), self._usual.limits
+        entropy = limits @ (parameters - np.log(usual)) - limits.sum() + self._total
+        return errors.cost(self._matrices(parameters)) + _ENTROPY_WEIGHT * float(entropy)
+
+    def _normal_equations(self, errors: _Errors) -> tuple[Floats, Floats]:
+        """Return the Gauss-Newton Hessian and the slope, halved, where the cost was taken last."""
+        limits = np.exp(self._parameters)
+        surprise = self._parameters - np.log(self._usual.limits)
+        rows, residuals = errors.rows()
         hessian = rows @ rows.T
         hessian[np.diag_indices_from(hessian)] += 0.5 * _ENTROPY_WEIGHT * limits
-        slope = rows @ residuals + 0.5 * _ENTROPY_WEIGHT * limits * surprise
-        return cost, hessian, slope
+        return hessian, rows @ residuals + 0.5 * _ENTROPY_WEIGHT * limits * surprise
+
+
+class _Errors:
+    """Errors of load factor and direction at some pairs, and their slopes."""
+
+    def __init__(self, pairs: ScaledPairs, motions: Floats) -> None:
+        """Hold the pairs.
+
+        Args:
+            pairs: In their order.
+            motions: Of all but the last of them, if these are known, to begin the search at; those
+                of earlier pairs may come before, shape (3, n).
+        """
+        self._solver = SmoothSupportSolver(np.ascontiguousarray(pairs.wrenches.T))
+        earlier = len(pairs) - 1
+        if 0 < earlier <= motions.shape[1]:
+            self._solver.begin_at(motions[:, motions.shape[1] - earlier :])
+        self._directions = np.ascontiguousarray(pairs.directions.T)
+        self._weights = pairs.weights
+
+    @property
+    def motions(self) -> Floats:
+        """Motions of the pairs' loads where the cost was taken last, shape (3, n)."""
+        return self._solver.motions
+
+    def cost(self, matrices: Floats) -> float:
+        """Return the cost of the pairs under the terms with these matrices."""
+        self._matrices = matrices
+        solver = self._solver
+        solver.solve(matrices)
+        self._norms = np.sqrt(np.einsum("cn,cn->n", solver.motions, solver.motions))
+        self._units = solver.motions / self._norms
+        cosines = np.einsum("cn,cn->n", self._units, self._directions)
+        self._log_factors = -np.log(solver.dissipation)
+        loss, _ = direction_loss(cosines, ROBUST_SCALE)
+        return float(self._weights @ (self._log_factors**2 + 2.0 * loss))
+
+    def rows(self) -> tuple[Floats, Floats]:
+        """Return slopes by the logarithms of the limits, a row for each, and the residuals."""
+        solver, weights, units = self._solver, self._weights, self._units
+        # Loads of the contacts, and how each turns the motion.
+        parts = (self._matrices.reshape(-1, 3) @ solver.motions).reshape(-1, 3, len(weights))
+        parts /= solver.speeds[:, None]
+        turned = solver.response(parts) / self._norms
+        turned -= np.einsum("kcn,cn->kn", turned, units)[:, None] * units
+        chords = units - self._directions
+        robust = 2.0 * ROBUST_SCALE / np.sqrt(np.sum(chords**2, axis=0) + ROBUST_SCALE**2)
+        of_size, of_chord = np.sqrt(weights), np.sqrt(weights * robust)
+        of_direction = (turned * of_chord).reshape(len(turned), -1)
+        rows = np.concatenate(
+            [-solver.speeds / solver.dissipation * of_size, of_direction], axis=1
+        )
+        residuals = np.concatenate([self._log_factors * of_size, (chords * of_chord).ravel()])
+        return rows, residuals

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """How uncertain the end of a slide is: many surfaces and inertias that data allow, one shove.
 
-The members of the ensemble are what is uncertain: surfaces of a bootstrap, friction and inertia
-drawn with them. Of n members the standard deviation is known to about 1 / sqrt(2 n).
+The members of the ensemble are what is uncertain: surfaces of `UncertainSurface.members` or of a
+bootstrap, friction and inertia drawn with them. Of n members the standard deviation is known to
+about 1 / sqrt(2 n).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +17,7 @@ import numpy as np
 from limit_surface_ros.checks import as_vectors
 from limit_surface_ros.errors import RangeError, ShapeError
 from limit_surface_ros.motion.sliding.batch import slides
+from limit_surface_ros.motion.spread import QUANTILES, EndPoses
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,27 +29,21 @@ if TYPE_CHECKING:
     from limit_surface_ros.motion.sliding.load import Load
     from limit_surface_ros.surface.base import LimitSurface
 
-# What is told of a spread: the median and the ends of its middle 90 %.
-QUANTILES = (0.05, 0.5, 0.95)
-
 
 @dataclass(frozen=True, eq=False)
-class Spread:
-    """Where the members of an ensemble come to rest.
+class Spread(EndPoses):
+    """Where and when the members of an ensemble come to rest.
 
     Attributes:
         times: [s], shape (n,).
-        poses: x, y [m] and heading [rad], not wound back to a turn, shape (n, 3).
-        time_quantiles: Of the times, at `QUANTILES`, shape (3,).
-        pose_quantiles: Of each component of the poses, shape (3, 3), quantile by component.
-        covariance: Of the poses, shape (3, 3).
     """
 
     times: Floats
-    poses: Floats
-    time_quantiles: Floats
-    pose_quantiles: Floats
-    covariance: Floats
+
+    @cached_property
+    def time_quantiles(self) -> Floats:
+        """Of the times, at `QUANTILES`, shape (3,)."""
+        return np.quantile(self.times, QUANTILES)
 
 
 def slide_spread(
@@ -92,10 +89,4 @@ def slide_spread(
     if count < 2:
         raise RangeError("an ensemble needs at least two members")
     found = slides(surfaces, inertias, np.broadcast_to(starts, (count, 3)), load, pose)
-    return Spread(
-        times=found.times,
-        poses=found.poses,
-        time_quantiles=np.quantile(found.times, QUANTILES),
-        pose_quantiles=np.quantile(found.poses, QUANTILES, axis=0),
-        covariance=np.cov(found.poses.T),
-    )
+    return Spread(poses=found.poses, times=found.times)

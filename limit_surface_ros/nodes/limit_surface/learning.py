@@ -1,24 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """A model that the `limit_surface` node learns from measured wrenches and twists while it serves.
 
-Measurements are paired by their stamps and cut into segments in the node's thread; each segment is
-learnt in a thread of its own, which holds no request, and the model that it makes is swapped in.
+Measurements are paired by their stamps and cut into segments in the node's thread. A process of
+its own learns each segment and makes the model, so that no request waits for Python's lock; a
+thread hands the segments over, and the node's thread swaps the models in.
 """
 
 from __future__ import annotations
 
 import collections
-import datetime
-import math
 import queue
 import threading
+from concurrent.futures import BrokenExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from geometry_msgs.msg import TwistStamped, WrenchStamped
 
-from limit_surface_ros import __version__
-from limit_surface_ros.errors import FileError, LimitSurfaceError, UnavailableError
+from limit_surface_ros.errors import DataError, FileError, LimitSurfaceError, UnavailableError
 from limit_surface_ros.files.surface_file import (
     SurfaceModel,
     read_surface_model,
@@ -28,9 +29,11 @@ from limit_surface_ros.nodes.messages import convert
 from limit_surface_ros.nodes.serving.settings import Setting
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from std_srvs.srv import Trigger
 
-    from limit_surface_ros.fitting.few_pushes.online import OnlineSurface, Update
+    from limit_surface_ros.fitting.few_pushes.online import Update
 
 SETTINGS = (
     Setting(
@@ -67,6 +70,12 @@ SUFFIX = "_learnt"
 _SAME_TIME = 20_000_000
 # Wrenches that wait for their twist, segments that wait to be learnt.
 _WRENCHES, _SEGMENTS = 100, 100
+# Pushes of which diagnostics tell how well they were predicted.
+_TOLD = 10
+# Ends of the process, without a push that was learnt in between, after which it is let be.
+_MOST_ENDS = 3
+# Between looks whether the node is run [s].
+_PAUSE = 0.02
 
 
 class Learner:
@@ -85,29 +94,28 @@ class Learner:
     """
 
     def __init__(self, node: Any) -> None:
-        """Subscribe and start the thread."""
+        """Serve the prior under the name of what is learnt, subscribe and start to learn."""
         # Not needed by nodes that do not learn, and slow to import.
-        from limit_surface_ros.fitting.few_pushes.online import OnlineSurface
         from limit_surface_ros.fitting.few_pushes.segments import Segments
 
         self._node = node
         self._prior: SurfaceModel = node.host.models[node.values["learn_prior"]]
         self.name = self._prior.name + SUFFIX
         self._path = node.values["learn_file"]
-        forgetting = "blend" if node.values["learn_forgetting"] == "blend" else 1.0
-        state = self._stored_state()
-        self._begin = lambda: (
-            OnlineSurface(self._prior.surface, forgetting=forgetting)
-            if state is None
-            else OnlineSurface.restored(state, self._prior.surface, forgetting=forgetting)
-        )
+        self._forgetting = "blend" if node.values["learn_forgetting"] == "blend" else 1.0
+        self._state = self._stored_state()
         self._segments = Segments(self._prior.surface.scaling)
         self._wrenches: collections.deque[tuple[int, Any]] = collections.deque(maxlen=_WRENCHES)
         self._work: queue.Queue[tuple[Any, Any] | None] = queue.Queue(_SEGMENTS)
         self._model: SurfaceModel | None = None
-        self._last: Update | None = None
-        self.count = 0
+        self._last: collections.deque[Update] = collections.deque(maxlen=_TOLD)
+        self._stopped = ""
+        self._closed = threading.Event()
+        # By the thread, and by the node's.
+        self._learnt = self.count = 0
         self._refused = 0
+        # Until there is a push: the name can be asked for, and made the default, from now on.
+        node.host.add(replace(self._prior, name=self.name))
         node.endpoints.add_input(WrenchStamped, "measured_wrench", self._take_wrench)
         node.endpoints.add_input(TwistStamped, "measured_twist", self._take_twist)
         node.endpoints.serve_trigger("save_learnt", self._save, "nothing was written")
@@ -117,15 +125,22 @@ class Learner:
     def describe(self) -> dict[str, str]:
         """Return what diagnostics say of it."""
         told = {"learning": f"{self.name}, {self.count} pushes, {self._refused} refused"}
-        if self._last is not None:
+        if self._stopped:
+            told["learning"] += f"; stopped: {self._stopped}"
+        if self._last:
             before, prior = (
-                math.degrees(angle) for angle in (self._last.angle_before, self._last.prior_angle)
+                np.degrees([getattr(update, name) for update in self._last])
+                for name in ("angle_before", "prior_angle")
             )
-            told["last push"] = f"predicted within {before:.1f} deg, by the prior {prior:.1f} deg"
+            sentence = "predicted within {:.1f} deg, by the prior {:.1f} deg"
+            told["last push"] = sentence.format(before[-1], prior[-1])
+            mean = f"{sentence}, mean of {len(before)}"
+            told["last pushes"] = mean.format(float(before.mean()), float(prior.mean()))
         return told
 
     def close(self) -> None:
-        """End the thread after the push that it is at."""
+        """End the thread and its process after the push that they are at."""
+        self._closed.set()
         while not self._work.empty():
             try:
                 self._work.get_nowait()
@@ -138,6 +153,9 @@ class Learner:
         surface, wrench, _ = await self._node.input.wrench(self._prior, message)
         # As it would be at the normal force that the model holds at.
         pressed = surface.scaling.friction_force / self._prior.surface.scaling.friction_force
+        if self._wrenches and stamp < self._wrenches[-1][0] - _SAME_TIME:
+            # Time was turned back: a bag begins anew, say.
+            self._wrenches.clear()
         self._wrenches.append((stamp, wrench / pressed))
 
     async def _take_twist(self, message: TwistStamped) -> None:
@@ -145,9 +163,14 @@ class Learner:
         _, twist, _ = await self._node.input.twist(self._prior, message)
         nearest = min(self._wrenches, key=lambda each: abs(each[0] - stamp), default=(None, None))
         if nearest[0] is None or abs(nearest[0] - stamp) > _SAME_TIME:
+            self._node.report(
+                "measured twist without a wrench",
+                "a twist on ~/measured_twist has no wrench of its time, at most "
+                f"{_SAME_TIME // 1_000_000} ms apart, and teaches nothing",
+            )
             return
         segment = self._segments.feed(1e-9 * stamp, nearest[1], twist)
-        if segment is None:
+        if segment is None or self._stopped:
             return
         try:
             self._work.put_nowait(segment)
@@ -155,65 +178,98 @@ class Learner:
             self._node.report("push not learnt", "pushes come faster than they are learnt")
 
     def _learn(self) -> None:
-        """Learn what the queue holds until it says to end; in a thread of its own."""
+        """Have the queue learnt until it says to end; in a thread of its own."""
+        from limit_surface_ros.fitting.workers import worker_processes
+
+        ends = 0
+        while ends < _MOST_ENDS:
+            known = self._learnt
+            try:
+                with worker_processes(1) as process:
+                    self._learn_in(process)
+                return
+            except BrokenExecutor:
+                ends = 1 if self._learnt > known else ends + 1
+                self._tell("the process that learns has ended; another goes on")
+        self._stop("its process ends again and again")
+
+    def _learn_in(self, process: Executor) -> None:
+        """Hand the queue over to a process."""
+        # The process imports this anew: it must not import ROS.
+        from limit_surface_ros.nodes.limit_surface import learning_process
+
+        begin = (replace(self._prior, fit={}), self.name, self._forgetting, self._state)
         try:
-            online = self._begin()
+            model = process.submit(learning_process.begin, *begin).result()
         except LimitSurfaceError as error:
-            self._tell(f"what was learnt before is left out: {error}")
+            self._stop(str(error))
             return
-        if online.count:
-            self._finish(online, None)
+        if model is not None:
+            self._finish(model, None)
         while True:
             segment = self._work.get()
             if segment is None:
                 return
             try:
-                update = online.add(*segment)
-                if update.accepted:
-                    self._finish(online, update)
-                else:
-                    self._refused += 1
+                learnt = process.submit(learning_process.learn, *segment).result()
             except LimitSurfaceError as error:
                 self._refused += 1
                 self._tell(f"a push was not learnt: {error}")
+                continue
+            if learnt.model is None:
+                self._refused += 1
+            else:
+                self._finish(learnt.model, learnt.update)
 
-    def _finish(self, online: OnlineSurface, update: Update | None) -> None:
-        """Make the model of what is learnt, and have the node's thread serve it."""
-        model = SurfaceModel(
-            name=self.name,
-            surface=online.surface(),
-            frame_id=self._prior.frame_id,
-            reference_point=self._prior.reference_point,
-            normal_force=self._prior.normal_force,
-            fit={
-                "objective": f"learnt push by push, {online.count} pushes",
-                "prior": self._prior.name,
-                "online": online.state(),
-                "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
-                "version": __version__,
-            },
-        )
-        count = online.count
+    def _finish(self, model: SurfaceModel, update: Update | None) -> None:
+        """Have the node's thread serve what is learnt."""
+        self._state = model.fit["online"]
+        self._learnt = len(self._state["pushes"]) if update is None else self._learnt + 1
+        count = self._learnt
 
         def serve() -> None:
             self._model, self.count = model, count
-            self._last = update or self._last
+            if update is not None:
+                self._last.append(update)
             self._node.host.add(model)
 
-        if self._node.executor is not None:
-            self._node.executor.create_task(serve)
+        self._in_the_node(serve)
+
+    def _stop(self, reason: str) -> None:
+        self._stopped = reason
+        self._tell(f"learning has stopped: {reason}")
 
     def _tell(self, sentence: str) -> None:
-        if self._node.executor is not None:
-            self._node.executor.create_task(self._node.report, "learning", sentence)
+        self._in_the_node(self._node.report, "learning", sentence)
+
+    def _in_the_node(self, call: Any, *arguments: Any) -> None:
+        """Call something in the node's thread, which begins some time after the node is made."""
+        while (executor := self._node.executor) is None:
+            if self._closed.wait(_PAUSE):
+                return
+        executor.create_task(call, *arguments)
 
     def _stored_state(self) -> Any:
         """Return the state of the file to go on from, None where there is none."""
         if not self._path or not Path(self._path).exists():
             return None
-        stored = read_surface_model(self._path).fit.get("online")
+        from limit_surface_ros.fitting.few_pushes.online import pushes_of_state
+
+        model = read_surface_model(self._path)
+        stored = model.fit.get("online")
         if stored is None:
             raise FileError(f"{self._path}: is no learnt model; learn_file names it")
+        try:
+            pushes_of_state(stored)
+        except DataError as error:
+            raise FileError(f"{self._path}: fit: online: {error}") from None
+        about = (self._prior.frame_id, self._prior.reference_point)
+        if (model.frame_id, model.reference_point) != about:
+            raise FileError(
+                f"{self._path}: was learnt in frame {model.frame_id!r} about "
+                f"{model.reference_point}, and {self._prior.name!r} is in {about[0]!r} about "
+                f"{about[1]}: name another learn_file"
+            )
         return stored
 
     def _save(self, _: Trigger.Request, response: Trigger.Response) -> None:

@@ -32,20 +32,23 @@ VERMILION = (0.835, 0.369, 0.0)
 GREEN = (0.0, 0.620, 0.451)
 ORANGE = (0.902, 0.624, 0.0)
 # Each marker is known by its namespace; the number within it is always 0.
-SURFACE, WRENCH, LIMIT, MOTION, ARC, CONTACT = (
+SURFACE, WRENCH, LIMIT, MOTION, ARC, CONE, CONTACT = (
     "surface",
     "wrench",
     "limit_wrench",
     "motion",
     "arc",
+    "cone",
     "contact",
 )
-OF_A_LOAD = (WRENCH, LIMIT, MOTION, ARC)
+OF_A_LOAD = (WRENCH, LIMIT, MOTION, ARC, CONE)
 # The surface is drawn about this many characteristic lengths wide if no scale is given.
 AUTOMATIC_WIDTH = 2.0
 # A centre of rotation farther than this many characteristic lengths is drawn as a straight path.
 STRAIGHT = 20.0
 _CELLS = 12
+_CONE_OPACITY = 0.35
+_NO_TWISTS = np.empty((0, 3))
 _ARC_POINTS = 48
 
 
@@ -145,6 +148,27 @@ def arc_marker(canvas: Canvas, twist: Floats) -> Marker:
     return marker
 
 
+def cone_marker(canvas: Canvas, twists: Floats) -> Marker:
+    """Return the fan that the arrow of a motion lies in at a probability.
+
+    Args:
+        canvas: Where to draw.
+        twists: Around the region of the motion, shape (n, 3); n of 0: none is known.
+    """
+    if not len(twists):
+        return removal(canvas, CONE)
+    ends = np.zeros((len(twists), 3))
+    ends[:, :2] = canvas.length * twists[:, :2]
+    marker = canvas.marker(CONE, Marker.TRIANGLE_LIST, ORANGE)
+    marker.color.a = _CONE_OPACITY
+    marker.scale.x = marker.scale.y = marker.scale.z = 1.0
+    corners = np.stack([np.zeros_like(ends), ends, np.roll(ends, -1, axis=0)], axis=1)
+    # A triangle is seen from one side alone.
+    both = np.concatenate([corners, corners[:, ::-1]])
+    marker.points = points_of(both.reshape(-1, 3))
+    return marker
+
+
 def contact_marker(canvas: Canvas) -> Marker:
     """Return the points of contact, the larger and the redder the more friction they can give.
 
@@ -167,7 +191,11 @@ def contact_marker(canvas: Canvas) -> Marker:
 
 
 def load_markers(
-    canvas: Canvas, wrench: Floats, limit_wrench: Floats, twist: Floats
+    canvas: Canvas,
+    wrench: Floats,
+    limit_wrench: Floats,
+    twist: Floats,
+    region: Floats = _NO_TWISTS,
 ) -> list[Marker]:
     """Return the markers of a load: itself, its limit, and the motion that it causes.
 
@@ -176,12 +204,14 @@ def load_markers(
         wrench: Shape (3,), [N, N, N m].
         limit_wrench: The wrench of the same direction on the surface, shape (3,).
         twist: Of unit norm in scaled variables, shape (3,); zero if the body sticks.
+        region: Twists around the region that it lies in, shape (n, 3); none if that is not known.
     """
     return [
         wrench_marker(canvas, wrench),
         limit_marker(canvas, limit_wrench),
         motion_marker(canvas, twist),
         arc_marker(canvas, twist),
+        cone_marker(canvas, region),
     ]
 
 

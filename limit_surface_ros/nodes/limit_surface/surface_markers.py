@@ -124,13 +124,15 @@ class SurfaceMarkers:
     def _load_markers(self, canvas: markers.Canvas) -> list[Marker]:
         if self._load is None:
             return []
-        _, surface, wrench, _ = self._load
+        model, surface, wrench, _ = self._load
         if not wrench.any():
             return [markers.removal(canvas, name) for name in markers.OF_A_LOAD]
         factor = float(surface.load_factor(wrench))
         slides = factor >= 1.0
         twist = surface.twist_of_wrench(wrench) if slides else np.zeros(3)
-        return markers.load_markers(canvas, wrench, wrench / factor, twist)
+        known = slides and model.uncertain is not None
+        region = model.uncertain.border(wrench) if known else np.empty((0, 3))
+        return markers.load_markers(canvas, wrench, wrench / factor, twist, region)
 
     def _prepare_timer(self, values: Values) -> Callable[[], None]:
         period = round(1e9 / values["marker_rate"])

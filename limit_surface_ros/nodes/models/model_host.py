@@ -140,8 +140,9 @@ class ModelHost(Generic[Model]):
         return apply
 
     def _read_set(self, files: Iterable[str], default: str) -> ModelSet[Model]:
+        models = read_model_set(resolved(files), self._read, noun=self._noun)
         try:
-            return read_model_set(resolved(files), self._read, default, self._noun)
+            return models.joined(self._added.values(), default)
         except UnknownModelError as error:
             names = " and ".join(self.names)
             raise UnknownModelError(

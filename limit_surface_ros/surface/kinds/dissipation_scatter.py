@@ -69,6 +69,19 @@ def region_quantile(probability: float) -> float:
     return FREEDOM * float((1.0 - probability) ** (-2.0 / FREEDOM) - 1.0)
 
 
+def region_probability(squares: Floats) -> Floats:
+    """Return the probability of the region on whose border a push lies.
+
+    Args:
+        squares: r' inv(S) r, not negative, any shape.
+
+    Example:
+        >>> float(region_probability(np.array(10.022)).round(3))
+        0.9
+    """
+    return np.asarray(1.0 - (1.0 + squares / FREEDOM) ** (-0.5 * FREEDOM))
+
+
 @dataclass(frozen=True, eq=False)
 class TwistWithCovariance:
     """A predicted twist and how far pushes scatter around it.
@@ -259,6 +272,74 @@ class UncertainSurface:
             RangeError: The probability is not between 0 and 1.
         """
         return self._looked_up(wrench, twist, region_quantile(probability))
+
+    def members(self, count: int, seed: int = 0) -> list[Dissipation]:
+        """Return surfaces as they may be in one push each, for ensembles of pushes and slides.
+
+        Each begins from what the model would be without one fold of the pushes, in turns; then the
+        friction of every term is off by itself, as the t distribution has it. What a push scatters
+        besides (`OWN`) is no surface's, and not in them.
+
+        Args:
+            count: How many.
+            seed: Of what is random.
+
+        Example:
+            >>> sphere = np.eye(3)[None]
+            >>> uncertain = UncertainSurface(
+            ...     Dissipation(sphere), TwistScatter(sphere, (sphere,) * 5)
+            ... )
+            >>> factors = [each.load_factor([1.0, 0.0, 0.0]) for each in uncertain.members(2000)]
+            >>> bool(0.15 < np.std(np.log(factors)) < 0.5)
+            True
+        """
+        rng = np.random.default_rng(seed)
+        folds, found = self.scatter.folds, []
+        for number in range(count):
+            matrices = folds[number % len(folds)]
+            heavy = FREEDOM / rng.chisquare(FREEDOM) * np.exp(self.scatter.log_scale)
+            off = FRICTION * np.sqrt(heavy) * rng.normal(size=len(matrices))
+            off = SATURATED * np.tanh(off / SATURATED)
+            factors = np.exp(2.0 * off)
+            found.append(Dissipation(matrices * factors[:, None, None], self.surface.scaling))
+        return found
+
+    def border(self, wrench: ArrayLike, probability: float = 0.9, count: int = 24) -> Floats:
+        """Return twists around the region in which that of a load lies at a probability.
+
+        Args:
+            wrench: Shape (3,), (fx, fy, tau_z) [N, N, N m].
+            probability: Of the region.
+            count: How many twists.
+
+        Returns:
+            (vx, vy, omega_z), unit in scaled variables, shape (count, 3).
+
+        Raises:
+            RangeError: The probability is not between 0 and 1.
+            ZeroVectorError: The wrench is zero.
+
+        Example:
+            >>> sphere = np.eye(3)[None]
+            >>> uncertain = UncertainSurface(
+            ...     Dissipation(sphere), TwistScatter(sphere, (sphere,) * 5)
+            ... )
+            >>> twists = uncertain.border([2.0, 0.0, 0.0], probability=0.9)
+            >>> np.arccos(twists @ [1.0, 0.0, 0.0]).round(3)[:3].tolist()
+            [0.177, 0.177, 0.177]
+        """
+        quantile = region_quantile(probability)
+        unit = self.surface.scaling.twist_unit
+        units = (np.asarray(self.surface.twist_of_wrench(wrench)) / unit)[None]
+        plane = tangent_basis(units)
+        values, axes = np.linalg.eigh(quantile * self.scatter.plane_scale(units, plane)[0])
+        angles = 2.0 * np.pi * np.arange(count) / count
+        round_it = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        away = round_it * np.sqrt(np.maximum(values, 0.0)) @ axes.T @ plane[0]
+        # No farther than the antipode, and there for any direction.
+        size = np.minimum(np.linalg.norm(away, axis=1, keepdims=True), np.pi)
+        ahead = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), _TINY)
+        return np.asarray((np.cos(size) * units + np.sin(size) * ahead) * unit)
 
     def prepare(self) -> None:
         """Make the table; later calls do not wait for it."""

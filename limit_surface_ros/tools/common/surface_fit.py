@@ -18,7 +18,7 @@ from limit_surface_ros.files.surface_file import SurfaceModel
 from limit_surface_ros.fitting.description import Description, describe_fit
 from limit_surface_ros.fitting.dissipation import fit_dissipation
 from limit_surface_ros.fitting.few_pushes.automatic import fit_automatically
-from limit_surface_ros.fitting.few_pushes.calibration import squared_residuals
+from limit_surface_ros.fitting.few_pushes.calibration import held_out_levels, inside_regions
 from limit_surface_ros.fitting.pairs import scaling_of_pairs
 from limit_surface_ros.fitting.polynomial import fit_polynomial
 from limit_surface_ros.fitting.power_sum import fit_power_sum
@@ -26,7 +26,7 @@ from limit_surface_ros.fitting.result import FitResult, errors_on
 from limit_surface_ros.fitting.search import Search
 from limit_surface_ros.fitting.second_approximation import fit_second_approximation
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
-from limit_surface_ros.surface.kinds.dissipation_scatter import region_quantile
+from limit_surface_ros.surface.kinds.dissipation_scatter import scatter_of
 from limit_surface_ros.surface.kinds.power_sum import thesis_exponents
 from limit_surface_ros.surface.scaling import Scaling
 from limit_surface_ros.tools.common.csv_options import cell_options
@@ -54,6 +54,7 @@ from limit_surface_ros.tools.common.training_data import (
 
 if TYPE_CHECKING:
     import argparse
+    from collections.abc import Mapping, Sequence
     from concurrent.futures import Executor
     from pathlib import Path
 
@@ -64,6 +65,10 @@ if TYPE_CHECKING:
 
 # Mean angle on its own data [deg] beyond which a model is none of them.
 WRONG_ANGLE = 25.0
+# Where a model file tells how many pushes its regions hold, of the folds and of held-out rows.
+CALIBRATION, HELD_OUT_CALIBRATION = "calibration", "held_out_calibration"
+# Regions of which the report tells.
+TOLD_REGIONS = (0.5, 0.9, 0.95)
 
 
 @dataclass(frozen=True)
@@ -74,13 +79,14 @@ class FittedModel:
         model: The model.
         result: How it was fitted.
         description: Its size, what its data cover, and what looks like a slip.
-        sureness: How far pushes scatter about its twists, in words; empty if that is not known.
+        sureness: How far pushes scatter about its twists, lines of a label and a text; none if
+            that is not known.
     """
 
     model: SurfaceModel
     result: FitResult
     description: Description
-    sureness: str = ""
+    sureness: Sequence[tuple[str, str]] = ()
 
 
 def fit_model(
@@ -168,18 +174,23 @@ def fit(options: argparse.Namespace, data: TrainingData, search: Search) -> FitR
         # A contact states its friction force; the loads of pushes only hint at it.
         scaling = Scaling(scaling.characteristic_length, data.support.scaling.friction_force)
     check_scaling(scaling)
-    if options.auto:
-        result = fit_automatically(
-            data.training,
-            scaling=scaling,
-            support=support_of(options, data),
-            folds=options.folds,
-            refits=options.bootstrap,
-            search=search,
-        )
-    else:
+    if not options.auto:
         result = fit_as_asked(options, data, scaling, search)
-    return result if data.held_out is None else result.tested_on(data.held_out)
+        return result if data.held_out is None else result.tested_on(data.held_out)
+    result = fit_automatically(
+        data.training,
+        scaling=scaling,
+        support=support_of(options, data),
+        folds=options.folds,
+        refits=options.bootstrap,
+        search=search,
+    )
+    if data.held_out is None or not isinstance(result.surface, Dissipation):
+        return result
+    scatter = scatter_of(result.details["uncertainty"], result.surface)
+    levels = held_out_levels(scatter, result.surface, data.held_out)
+    details = {**result.details, HELD_OUT_CALIBRATION: inside_regions(levels)}
+    return replace(result.tested_on(data.held_out), details=details)
 
 
 def fit_as_asked(
@@ -270,19 +281,33 @@ def support_of(options: argparse.Namespace, data: TrainingData) -> PointContacts
     return data.support if options.support else None
 
 
-def sureness_of(model: SurfaceModel, data: TrainingData) -> str:
-    """Return in words how far pushes scatter, and whether those that were held out do so."""
+def sureness_of(model: SurfaceModel, data: TrainingData) -> list[tuple[str, str]]:
+    """Return how far pushes scatter, and how many of those not seen the regions hold."""
     uncertain = model.uncertain
     if uncertain is None or not isinstance(model.surface, Dissipation):
-        return ""
+        return []
     axes = np.degrees(uncertain.twist_with_covariance(data.training.wrenches).half_axes)
     large, small = np.median(axes, axis=0)
     text = f"9 of 10 pushes within {large:.0f} x {small:.0f} deg (median) of the prediction"
-    if data.held_out is None:
-        return text
-    squares = squared_residuals(uncertain.scatter, model.surface, data.held_out)
-    share = np.mean(squares <= region_quantile(0.9))
-    return f"{text}; of those held out {100.0 * share:.0f} %"
+    lines = [("scatter", text)]
+    if CALIBRATION in model.fit:
+        lines.append((CALIBRATION, shares_in_words(model.fit[CALIBRATION])))
+    if HELD_OUT_CALIBRATION in model.fit:
+        lines.append(
+            ("", f"{shares_in_words(model.fit[HELD_OUT_CALIBRATION])}, of those held out")
+        )
+    return lines
+
+
+def shares_in_words(calibration: Mapping[str, Any]) -> str:
+    """Return which shares of the pushes that a fit did not see lie inside of its regions."""
+    inside = dict(zip(calibration["regions"], calibration["inside"], strict=True))
+    told, found = (
+        " / ".join(f"{100.0 * share:.0f}" for share in shares)
+        for shares in (TOLD_REGIONS, [inside[region] for region in TOLD_REGIONS])
+    )
+    pushes = counted(calibration["pushes"], "push")
+    return f"{told} % regions hold {found} % of {pushes} not seen"
 
 
 def doubts_of_errors(result: FitResult) -> list[str]:

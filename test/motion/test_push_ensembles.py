@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is uncertain of a surface spreads the end of a push, and is told as it is."""
+
+import numpy as np
+import pytest
+
+from limit_surface_ros.errors import RangeError
+from limit_surface_ros.motion.outline import Polygon
+from limit_surface_ros.motion.rollout import simulate_push
+from limit_surface_ros.motion.spread import EndPoses, push_spread
+from limit_surface_ros.surface.kinds.dissipation import Dissipation
+from limit_surface_ros.surface.kinds.dissipation_scatter import (
+    FRICTION,
+    TwistScatter,
+    UncertainSurface,
+)
+from limit_surface_ros.surface.scaling import Scaling
+
+BOX = Polygon([[-0.05, -0.03], [0.05, -0.03], [0.05, 0.03], [-0.05, 0.03]])
+FEET = np.array([[-0.8, -0.5], [0.8, -0.5], [0.8, 0.5], [-0.8, 0.5]])
+PUSH = (BOX, 0.005, 0.25, [0, 0, 0], [[-0.07, 0.02], [0.0, 0.02]])
+
+
+def uncertain(log_scale=0.0):
+    """A box on four feet, and how its pushes scatter."""
+    x, y = FEET.T
+    one, none = np.ones(4), np.zeros(4)
+    forms = np.array([[one, none, -y], [none, one, x], [-y, x, x * x + y * y + 0.05]])
+    matrices = np.moveaxis(forms, -1, 0) / 16.0
+    scatter = TwistScatter(matrices, (matrices,) * 5, log_scale)
+    return UncertainSurface(Dissipation(matrices, Scaling(0.05, 4.0)), scatter)
+
+
+def crosses(first, second):
+    """Cross products of vectors in the plane."""
+    return first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+
+
+def test_members_are_pushed_as_alone_and_the_ellipse_holds_nine_of_ten():
+    body = uncertain()
+    members = body.members(40)
+    ends = push_spread(members, *PUSH)
+    for number in (0, 17):
+        alone = simulate_push(members[number], *PUSH).end_pose
+        np.testing.assert_allclose(ends.poses[number], alone, atol=1e-12)
+    border = ends.ellipse(0.9).border()
+    inside = [
+        crosses(np.roll(border, -1, axis=0) - border, place - border).min() > 0.0
+        for place in ends.poses[:, :2]
+    ]
+    assert np.mean(inside) == pytest.approx(0.9, abs=0.03)
+    low, high = ends.pose_quantiles[0], ends.pose_quantiles[2]
+    assert (low <= simulate_push(body.surface, *PUSH).end_pose).all()
+    assert (simulate_push(body.surface, *PUSH).end_pose <= high).all()
+
+
+def test_the_friction_of_each_term_scatters_by_itself_and_by_the_scale_of_the_fit():
+    def spread_of(log_scale):
+        body = uncertain(log_scale)
+        logarithms = [
+            0.5 * np.log(each.matrices[:, 0, 0] / body.scatter.matrices[:, 0, 0])
+            for each in body.members(3000)
+        ]
+        middle = np.quantile(logarithms, [0.25, 0.75], axis=0)
+        assert np.abs(np.corrcoef(np.sign(logarithms).T) - np.eye(4)).max() < 0.1
+        return np.diff(middle, axis=0).mean()
+
+    # The quartiles of a t distribution of 3.3 degrees of freedom are at 0.75 of its scale.
+    assert spread_of(0.0) == pytest.approx(2.0 * 0.755 * FRICTION, rel=0.06)
+    assert spread_of(-1.0) == pytest.approx(np.exp(-0.5) * spread_of(0.0), rel=0.08)
+
+
+def test_no_spread_is_told_of_one_member_or_no_share():
+    with pytest.raises(RangeError, match="at least two members"):
+        push_spread(uncertain().members(1), *PUSH)
+    with pytest.raises(RangeError, match="probability must be above 0"):
+        EndPoses(np.zeros((3, 3))).ellipse(1.0)
+    # Members that agree end at one place.
+    assert not EndPoses(np.ones((3, 3))).ellipse(0.9).half_axes.any()
