@@ -9,6 +9,7 @@ thread hands the segments over, and the node's thread swaps the models in.
 from __future__ import annotations
 
 import collections
+import contextlib
 import queue
 import threading
 from concurrent.futures import BrokenExecutor
@@ -103,19 +104,20 @@ class Learner:
         self.name = self._prior.name + SUFFIX
         self._path = node.values["learn_file"]
         self._forgetting = "blend" if node.values["learn_forgetting"] == "blend" else 1.0
-        self._state = self._stored_state()
+        stored = self._stored()
+        self._state = None if stored is None else stored.fit["online"]
         self._segments = Segments(self._prior.surface.scaling)
         self._wrenches: collections.deque[tuple[int, Any]] = collections.deque(maxlen=_WRENCHES)
         self._work: queue.Queue[tuple[Any, Any] | None] = queue.Queue(_SEGMENTS)
-        self._model: SurfaceModel | None = None
+        self._model = stored
         self._last: collections.deque[Update] = collections.deque(maxlen=_TOLD)
         self._stopped = ""
         self._closed = threading.Event()
         # By the thread, and by the node's.
-        self._learnt = self.count = 0
+        self._learnt = self.count = 0 if stored is None else len(stored.fit["online"]["pushes"])
         self._refused = 0
-        # Until there is a push: the name can be asked for, and made the default, from now on.
-        node.host.add(replace(self._prior, name=self.name))
+        # Before there is a push the name can be asked for, and made the default.
+        node.host.add(replace(stored or self._prior, name=self.name))
         node.endpoints.add_input(WrenchStamped, "measured_wrench", self._take_wrench)
         node.endpoints.add_input(TwistStamped, "measured_twist", self._take_twist)
         node.endpoints.serve_trigger("save_learnt", self._save, "nothing was written")
@@ -247,10 +249,12 @@ class Learner:
         while (executor := self._node.executor) is None:
             if self._closed.wait(_PAUSE):
                 return
-        executor.create_task(call, *arguments)
+        # An executor that has ended meanwhile has no guard condition to trigger.
+        with contextlib.suppress(AttributeError):
+            executor.create_task(call, *arguments)
 
-    def _stored_state(self) -> Any:
-        """Return the state of the file to go on from, None where there is none."""
+    def _stored(self) -> SurfaceModel | None:
+        """Return the model of the file to go on from, None where there is none."""
         if not self._path or not Path(self._path).exists():
             return None
         from limit_surface_ros.fitting.few_pushes.online import pushes_of_state
@@ -270,7 +274,7 @@ class Learner:
                 f"{model.reference_point}, and {self._prior.name!r} is in {about[0]!r} about "
                 f"{about[1]}: name another learn_file"
             )
-        return stored
+        return model
 
     def _save(self, _: Trigger.Request, response: Trigger.Response) -> None:
         """Answer `~/save_learnt`."""

@@ -128,21 +128,24 @@ class ModelHost(Generic[Model]):
         files, default = (values[name] for name in self.names)
         # Warnings belong into the node's log, not to standard error with a line of our source.
         with warnings.catch_warnings(record=True) as raised:
-            models = self._read_set(files, default)
+            models, served = self._read_set(files, default)
         for warning in raised:
             self._warn(str(warning.message))
         self._read_last = models
 
         def apply() -> None:
-            self.models = models.joined(self._added.values())
+            self.models = served.joined(self._added.values())
             self._start_preparing(models)
 
         return apply
 
-    def _read_set(self, files: Iterable[str], default: str) -> ModelSet[Model]:
+    def _read_set(
+        self, files: Iterable[str], default: str
+    ) -> tuple[ModelSet[Model], ModelSet[Model]]:
+        """Return what the files hold, and that with what was added."""
         models = read_model_set(resolved(files), self._read, noun=self._noun)
         try:
-            return models.joined(self._added.values(), default)
+            return models, models.joined(self._added.values(), default)
         except UnknownModelError as error:
             names = " and ".join(self.names)
             raise UnknownModelError(
