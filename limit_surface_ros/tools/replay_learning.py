@@ -165,9 +165,11 @@ def model_of(
     online: OnlineSurface, prior: SurfaceModel | None, data: TrainingData, name: str
 ) -> SurfaceModel:
     """Return what was learnt as a model, with the pushes of its window."""
+    surface, scatter = online.surface_and_scatter()
+    sureness = {} if scatter is None else {"uncertainty": scatter.stored()}
     return SurfaceModel(
         name=name,
-        surface=online.surface(),
+        surface=surface,
         frame_id=prior.frame_id if prior else data.frame_id or "object",
         reference_point=prior.reference_point if prior else data.reference_point,
         normal_force=data.normal_force or (prior.normal_force if prior else None),
@@ -176,6 +178,7 @@ def model_of(
             "objective": f"learnt push by push, {counted(online.count, 'push')}",
             "prior": prior.name if prior else "a sphere",
             "online": online.state(),
+            **sureness,
             "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
             "version": __version__,
         },

@@ -48,6 +48,7 @@ def test_the_curve_falls_and_the_learnt_model_predicts(pushes, tmp_path, capsys)
     assert (model.name, model.frame_id) == ("learnt", "box")
     test = random_loads(BODY, 200, 9)
     assert mean_angle(model.surface, test) < 0.5 * mean_angle(wrong, test)
+    assert (model.uncertain.twist_with_covariance([1.0, 0.2, 0.01]).half_axes > 0.0).all()
     again = OnlineSurface.restored(model.fit["online"], wrong)
     assert again.count == 19
 
