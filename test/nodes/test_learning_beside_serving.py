@@ -82,7 +82,7 @@ class Robot:
             self.sample(np.zeros(3), np.zeros(3))
             self.time += 1.0
             try:
-                self.ros.wait(lambda known=known: node.learner.count > known, 3.0)
+                self.ros.wait(lambda known=known: node.learner.count > known, 12.0)
             except AssertionError:
                 continue
         assert node.learner.count >= goal

@@ -48,6 +48,8 @@ _STEPS = 4
 # steps a push that the new ones take.
 _FIRST_PLACING, _PLACING_EVERY, _PLACING_STEPS = 6, 4, 3
 _FARTHEST_STEP = 2.0
+# Weight below which a push is left out of a window that forgets.
+_FORGOTTEN = 0.02
 # Logarithm of the share of the largest limit below which a contact is left out.
 _IDLE = math.log(1e-3)
 _DAMPING, _LEAST_DAMPING, _MORE, _LESS = 0.03, 1e-4, 5.0, 0.4
@@ -64,6 +66,8 @@ class Window:
             length: How many pushes are kept.
             forgetting: Weight of a push relative to the next.
         """
+        if forgetting < 1.0:
+            length = min(length, math.ceil(math.log(_FORGOTTEN) / math.log(forgetting)))
         self._length, self._forgetting = length, forgetting
         self._scaling: Scaling = prior.scaling
         contacts = SmallContacts.around(_DISCS)
