@@ -10,7 +10,7 @@ import signal
 import threading
 import time
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing.context import ForkContext, ForkProcess, SpawnContext, SpawnProcess
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -144,7 +144,11 @@ class _Drain:
         """Note the pool's thread and the pipe while the pool still knows them."""
         self._manager = getattr(pool, "_executor_manager_thread", None)
         reader = getattr(getattr(pool, "_call_queue", None), "_reader", None)
-        self._end = None if self._manager is None or reader is None else os.dup(reader.fileno())
+        self._end: int | None = None
+        # A pool whose workers have died closes the pipe by itself.
+        with suppress(OSError):
+            if self._manager is not None and reader is not None:
+                self._end = os.dup(reader.fileno())
 
     def run_until_pool_has_ended(self) -> None:
         """Drain in a thread, which goes on if another interrupt ends this wait."""
