@@ -24,7 +24,7 @@ def _polynomial() -> Polynomial:
     return Polynomial(coefficients, SCALING)
 
 
-# Support points of a triangle, and one of an L that is far from its reference point.
+# Support points of a triangle.
 TRIANGLE = PointContacts([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]], [0.5] * 3, SCALING)
 MODELS = {
     "ellipsoid": PowerSum(_forms(1, [3]), [1.0], SCALING),
@@ -37,6 +37,12 @@ MODELS = {
     "dissipation_nearly_with_facets": Dissipation(_forms(8, [2] * 3, 1e-13), SCALING),
     "triangle": TRIANGLE,
     "polynomial": _polynomial(),
+    # Of 0.1 m, and 2.2 m from the reference point: the products in a power cancel.
+    "points_far_off": PointContacts(
+        [[0.973, 2.046], [0.969, 1.993], [0.941, 1.984], [0.953, 1.962]],
+        [0.8, 0.42, 0.59, 0.98],
+        SCALING,
+    ),
 }
 
 

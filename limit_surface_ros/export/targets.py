@@ -13,6 +13,7 @@ from limit_surface_ros.export.mjcf import mujoco_model
 from limit_surface_ros.export.portable import portable
 from limit_surface_ros.export.python_modules import casadi_module, jax_module
 from limit_surface_ros.export.simulators import fit_ellipsoid, match_single_contact
+from limit_surface_ros.export.texts import comment
 
 if TYPE_CHECKING:
     from limit_surface_ros.files.surface_file import SurfaceModel
@@ -62,7 +63,7 @@ def export_surface(model: SurfaceModel, target: str, spheres: int = 4) -> Export
     """
     surface, name = model.surface, model.name
     x, y = model.reference_point
-    title = (
+    title = comment(
         f"Limit surface {name} ({surface.kind}): frame {model.frame_id}, "
         f"reference point ({x:g}, {y:g}) m."
     )

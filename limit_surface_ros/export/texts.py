@@ -7,10 +7,17 @@ import re
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
+from limit_surface_ros.errors import shortened
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from limit_surface_ros.checks import Floats
+
+
+# Characters that mean something to one of the targets within a comment or a docstring.
+_SPEAKING = "\\\"'*<>"
+_LONGEST_COMMENT = 300
 
 
 def template(name: str) -> str:
@@ -20,13 +27,22 @@ def template(name: str) -> str:
 
 def filled(name: str, values: Mapping[str, str]) -> str:
     """Return a template with each @KEY@ replaced; a key that is left over is a defect."""
-    text = template(name)
-    for key, value in values.items():
-        text = text.replace(f"@{key}@", value)
-    left = re.search(r"@[A-Z_]+@", text)
-    if left:
-        raise KeyError(f"template {name} has no value for {left[0]}")
-    return text
+
+    def value(key: re.Match[str]) -> str:
+        if key[1] not in values:
+            raise KeyError(f"template {name} has no value for {key[0]}")
+        return values[key[1]]
+
+    # In one pass: what a value holds is no key.
+    return re.sub(r"@([A-Z_]+)@", value, template(name))
+
+
+def comment(text: str) -> str:
+    """Return a text that no comment or docstring of any target ends or continues at."""
+    return "".join(
+        character if character.isprintable() and character not in _SPEAKING else "_"
+        for character in shortened(text, _LONGEST_COMMENT)
+    )
 
 
 def identifier(name: str) -> str:

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The promise of `export_surface`: each target is written, and what is left out is named."""
 
+import ast
 import re
+import shutil
+import subprocess
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -9,7 +13,7 @@ import yaml
 
 from export_models import MODELS
 from limit_surface_ros.export.portable import portable
-from limit_surface_ros.export.targets import SUFFIXES
+from limit_surface_ros.export.targets import SUFFIXES, export_surface
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
 from limit_surface_ros.surface import PowerSum
 from limit_surface_ros.tools.export_surface import main
@@ -63,3 +67,48 @@ def test_wrong_targets_and_places_are_refused(model_file, capsys):
     assert "1 to 32" in capsys.readouterr().err
     assert main([str(model_file), "--to", "ellipsoid", "-o", str(model_file)]) == 2
     assert "input" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "*/ x",
+        "a\nb",
+        'tri"""ple',
+        "back\\slash\\",
+        "\\U",
+        "@NAME@",
+        "x\u2028y",
+        "--><x>",
+        "\u03c0" * 400,
+    ],
+)
+def test_no_name_of_a_model_speaks_in_its_text(name, tmp_path):
+    model = SurfaceModel(name, MODELS["dissipation_4"], frame_id=name)
+    texts = {target: export_surface(model, target).text for target in SUFFIXES}
+    for target in ("casadi", "jax"):
+        tree = ast.parse(texts[target])
+        (given,) = (
+            each.value.value
+            for each in tree.body
+            if isinstance(each, ast.Assign) and each.targets[0].id == "NAME"
+        )
+        assert given == name
+    ElementTree.fromstring(texts["mujoco"])
+    assert np.shape(yaml.safe_load(texts["ellipsoid"])["L"]) == (3, 3)
+    for program, target, options in (
+        (
+            "g++",
+            "cpp",
+            ["-std=c++17", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", "-x", "c++"],
+        ),
+        ("node", "js", ["--check"]),
+    ):
+        path = tmp_path / f"model{SUFFIXES[target]}"
+        path.write_text(texts[target], encoding="utf-8")
+        if shutil.which(program):
+            source = path
+            if target == "cpp":
+                source = tmp_path / "model.cpp"
+                source.write_text('#include "model.hpp"', encoding="utf-8")
+            subprocess.run([program, *options, source], check=True)

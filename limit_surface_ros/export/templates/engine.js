@@ -150,16 +150,20 @@ function descend(gauge, n, smoothing, start) {
     const move = solve(k, rest);
     const residual = length(rest), relative = length(move) / length(x);
     if (!(relative < 1e100)) return null;
-    if (relative <= 1e-9 || residual <= 1e-15 * size) {
-      return residual > 1e-5 * size ? null : x.map((each, i) => each + move[i]);
+    // A kink draws the steps in.
+    if (relative <= 1e-13 && residual > 1e-5 * size) return null;
+    if ((relative <= 1e-9 && residual <= 1e-5 * size) || residual <= 1e-15 * size) {
+      return x.map((each, i) => each + move[i]);
     }
     const slope = dot(rest, move);
+    // Far from the reference point the products cancel: rounding is a part of what they sum.
+    const noise = 1e-15 * size * length(x);
     let part = 1, fell = false;
     for (let halving = 0; halving < 30; ++halving, part *= 0.5) {
       const trial = x.map((each, i) => each + part * move[i]);
       const there = gauge(trial, smoothing);
       const lower = 0.5 * there.value * there.value - dot(n, trial);
-      if (lower <= height - 1e-4 * part * slope + 1e-15 * Math.abs(height)) {
+      if (lower <= height - 1e-4 * part * slope + noise) {
         [x, at, height, fell] = [trial, there, lower, true];
         break;
       }

@@ -386,15 +386,17 @@ inline bool descend(const Vector<double>& n, double smoothing, Vector<double>& x
         if (!(length < 1e100)) {
             return false;
         }
-        if (length <= 1e-9 || residual <= 1e-15 * size) {
-            if (residual > 1e-5 * size) {
-                return false;  // A kink drew the steps in.
-            }
+        if (length <= 1e-13 && residual > 1e-5 * size) {
+            return false;  // A kink drew the steps in.
+        }
+        if ((length <= 1e-9 && residual <= 1e-5 * size) || residual <= 1e-15 * size) {
             for (std::size_t i = 0; i < 3; ++i) {
                 x[i] += move[i];
             }
             return true;
         }
+        // Far from the reference point the products cancel: rounding is a part of what they sum.
+        const double noise = 1e-15 * size * std::sqrt(dot(x, x));
         double part = 1.0;
         bool fell = false;
         for (int halving = 0; halving < 30; ++halving) {
@@ -404,7 +406,7 @@ inline bool descend(const Vector<double>& n, double smoothing, Vector<double>& x
             }
             Local<double> there = gauge(trial, smoothing, true);
             const double lower = 0.5 * there.value * there.value - dot(n, trial);
-            if (lower <= height - 1e-4 * part * slope + 1e-15 * std::fabs(height)) {
+            if (lower <= height - 1e-4 * part * slope + noise) {
                 x = trial;
                 at = there;
                 height = lower;
