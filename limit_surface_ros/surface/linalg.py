@@ -87,34 +87,6 @@ def root_of(matrix: Floats) -> Floats:
     return root
 
 
-def solve_symmetric(matrices: Floats, columns: Floats) -> Floats:
-    """Return the solutions x of A x = b for positive definite matrices, all at once.
-
-    By A = L D L' in closed form: a loop over small matrices, as numpy's, takes thirty times as
-    long.
-
-    Args:
-        matrices: A, shape (3, 3, m).
-        columns: b, shape (3, m).
-
-    Returns:
-        Shape (3, m).
-    """
-    (a, b, c), (_, d, e), (_, _, f) = matrices
-    low_b, low_c = b / a, c / a
-    # Rounding may leave less than nothing of a matrix that is almost singular.
-    least = 1e-16 * (a + d + f)
-    middle = np.maximum(d - low_b * b, least)
-    across = e - low_b * c
-    low_e = across / middle
-    last = np.maximum(f - low_c * c - low_e * across, least)
-    x, y, z = columns
-    y = y - low_b * x
-    z = (z - low_c * x - low_e * y) / last
-    y = y / middle - low_e * z
-    return np.array([x / a - low_b * y - low_c * z, y, z])
-
-
 def even_directions(count: int) -> Floats:
     """Return `count` unit vectors on a Fibonacci spiral, shape (count, 3).
 

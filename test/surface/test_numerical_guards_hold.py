@@ -109,7 +109,7 @@ def test_a_flat_place_is_no_dent_and_a_shallow_dent_is_one():
     dented[3] = -1e-3
     convexity = is_convex(Polynomial(dented))
     assert not convexity.convex
-    assert convexity.dented_share < 0.05
+    assert 0.012 < convexity.dented_share < 0.02
 
 
 @pytest.mark.parametrize("count", [30, 250])
@@ -145,3 +145,64 @@ def test_norms_that_share_a_null_space_are_no_corner_of_one():
     once = Dissipation([4.0 * form, third])
     loads = sampling.random_directions(400, 0)
     np.testing.assert_allclose(twice.load_factor(loads), once.load_factor(loads), rtol=1e-8)
+
+
+@pytest.mark.parametrize("seed", [306, 1458])
+def test_a_kink_that_draws_the_search_in_is_not_taken_for_the_answer(seed):
+    # Of one of these motions each, Newton's method alone ends 6e-5 off, beside a support point.
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(2, 6))
+    points = rng.uniform(-0.05, 0.05, (count, 2))
+    surface = PointContacts(points, rng.uniform(0.1, 1.5, count), Scaling(0.05, 1.0))
+    which = rng.integers(0, count, 100)
+    away = 10.0 ** rng.uniform(-12, -2, (100, 1)) * rng.standard_normal((100, 2))
+    x, y = (points[which] + 0.01 * away).T
+    twists = np.column_stack([y, -x, np.ones(100)])
+    found = surface.twist_of_wrench(surface.wrench_of_twist(twists))
+    found /= np.abs(found[:, 2:])
+    np.testing.assert_allclose(found, twists, atol=2e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_loads_on_the_rim_of_a_facet_turn_the_body_about_its_support_point(seed):
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(-0.05, 0.05, (3, 2))
+    limits = rng.uniform(0.1, 1.5, 3)
+    surface = PointContacts(points, limits, Scaling(0.05, 1.0))
+    x, y = np.repeat(points, 10, axis=0).T
+    about = np.column_stack([y, -x, np.ones(30)])
+    angle = rng.uniform(0.0, 2.0 * np.pi, 30)
+    fx, fy = np.repeat(limits, 10) * (np.cos(angle), np.sin(angle))
+    loads = surface.wrench_of_twist(about) + np.column_stack([fx, fy, x * fy - y * fx])
+    for found in (
+        surface.twist_of_wrench(loads),
+        np.array([surface.twist_of_wrench(load) for load in loads]),
+    ):
+        np.testing.assert_allclose(found / found[:, 2:], about, atol=1e-12)
+
+
+def test_a_corner_between_flat_faces_is_met_from_beside_it():
+    # |v| + |omega|: the loads are a disc times an interval. Beside its corner nothing is curved.
+    surface = Dissipation([np.diag([1.0, 1.0, 0.0]), np.diag([0.0, 0.0, 1.0])])
+    loads = sampling.random_directions(100, 0)
+    expected = np.maximum(np.hypot(loads[:, 0], loads[:, 1]), np.abs(loads[:, 2]))
+    np.testing.assert_allclose(surface.load_factor(loads), expected, rtol=1e-12)
+    alone = [surface.load_factor(load) for load in loads]
+    np.testing.assert_allclose(alone, expected, rtol=1e-12)
+
+
+def test_a_load_beside_a_null_space_keeps_the_little_that_a_term_adds():
+    surface = PowerSum([np.eye(3), np.diag([1.0, 4.0, 0.0])], [1.0, 0.2])
+    away = 10.0 ** np.linspace(-11, -1, 30)
+    loads = np.column_stack([away, away, np.ones(30)])
+    alone = np.array([surface.load_factor(load) for load in loads])
+    for factors in (surface.load_factor(loads), alone):
+        terms = (1.0 + 2.0 * away**2) / factors**2 + (5.0 * away**2 / factors**2) ** 0.2
+        np.testing.assert_allclose(terms, 1.0, rtol=1e-13)
+
+
+@pytest.mark.parametrize("exponent", [0.2, 0.3, 0.45])
+def test_rounding_on_a_straight_side_is_no_dent(exponent):
+    # One form alone makes a cylinder, whatever its exponents: straight in one direction.
+    root = np.random.default_rng(0).standard_normal((2, 3))
+    assert is_convex(PowerSum([root.T @ root] * 2, [exponent, 1.0])).convex

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     # The entries xx, xy, xz, yy, yz and zz of a symmetric matrix.
     Six: TypeAlias = tuple[float, float, float, float, float, float]
     # Height, gradient and Newton's move at a place in a plane.
-    PlaneStep: TypeAlias = tuple[float, tuple[float, float], tuple[float, float]]
+    PlaneStep: TypeAlias = tuple[float, tuple[float, float]]
 
 
 class Turning(NamedTuple):
@@ -86,10 +86,6 @@ class BoundedGauge(Gauge, Protocol):
         """Return P (m, 3, 3): the ellipsoids x' P^-1 x = 1 touch the surface at points (3, m)."""
         ...
 
-    def along_ellipsoids(self, points: Floats, normals: Floats) -> Floats:
-        """Return P n (3, m) for normals n (3, m), with P as `ellipsoids` gives it."""
-        ...
-
 
 class ScalarGauge(Protocol):
     """A gauge of one vector at a time, in plain floats; None stands for "this needs care"."""
@@ -115,7 +111,7 @@ class ScalarGauge(Protocol):
     ) -> Callable[[float, float], PlaneStep | None]:
         """Return a function of the p and q of a point n + p e1 + q e2.
 
-        It returns log g, its gradient, and Newton's move for g in p and q.
+        It returns log g and Newton's move for g in p and q.
 
         Args:
             normal: n, a unit vector.

@@ -11,7 +11,7 @@ from limit_surface_ros.surface.gauges.corners import Corners
 from limit_surface_ros.surface.gauges.gauge import Turning
 from limit_surface_ros.surface.gauges.jacobians import six_of, sum_of_terms, take_outer
 from limit_surface_ros.surface.gauges.power_scale import power_scale
-from limit_surface_ros.surface.linalg import NULL_TOLERANCE, solve_symmetric, squared_lengths
+from limit_surface_ros.surface.linalg import NULL_TOLERANCE, squared_lengths
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
@@ -141,10 +141,6 @@ class PowerSumGauge:
             loads: Directions in which they touch, shape (3, m).
         """
         return np.asarray(np.linalg.inv(np.moveaxis(self._tangent_forms(loads), 2, 0)))
-
-    def along_ellipsoids(self, loads: Floats, normals: Floats) -> Floats:
-        """Return P n (3, m), along the load of maximum dissipation n.f on each of `ellipsoids`."""
-        return solve_symmetric(self._tangent_forms(loads), normals)
 
     def _tangent_forms(self, loads: Floats) -> Floats:
         """Return P^-1 (3, 3, m), quadratic forms that are 1 on ellipsoids within the surface.

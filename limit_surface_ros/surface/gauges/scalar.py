@@ -134,7 +134,7 @@ class NormSumScalar:
                 h12 += weight * (a12 - c1 * c2)
                 h22 += weight * (a22 - c2 * c2)
             move = _newton_move(g1, g2, h11, h12, h22)
-            return None if move is None else (log(gauge), (g1 / gauge, g2 / gauge), move)
+            return None if move is None else (log(gauge), move)
 
         return step
 
@@ -253,7 +253,7 @@ class PowerSumScalar:
             h12 = (k12 - m1 * g2 - m2 * g1) / total + both * g1 * g2
             h22 = (k22 - 2.0 * m2 * g2) / total + both * g2 * g2
             move = _newton_move(g1, g2, h11, h12, h22)
-            return None if move is None else (-t, (g1, g2), move)
+            return None if move is None else (-t, move)
 
         return step
 
@@ -376,8 +376,7 @@ class QuarticScalar:
                 a1 * bx + a2 * by + a3 * bm - correction * g1 * g2,
                 b1 * bx + b2 * by + b3 * bm - correction * g2 * g2,
             )
-            scale = 0.25 / value
-            return None if move is None else (0.25 * log(value), (scale * g1, scale * g2), move)
+            return None if move is None else (0.25 * log(value), move)
 
         return step
 

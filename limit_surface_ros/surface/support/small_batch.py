@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 FEW = 24
 _STEPS = 30
 _LAST_STEP = 1e-8
-# A step is the last if the sine before it was no larger: a kink draws Newton's method in with one.
-_PARALLEL = 1e-6
 # Power below which a unit normal is as good as across a corner's point.
 _ACROSS = 1e-9
 
@@ -140,7 +138,7 @@ class SmallBatch(SupportSolver):
             found = newton(p, q)
             if found is None:
                 return None
-            height, gradient, move = found
+            height, move = found
             if height > previous + 1e-15:
                 step_p, step_q = 0.5 * step_p, 0.5 * step_q
                 p -= step_p
@@ -148,11 +146,10 @@ class SmallBatch(SupportSolver):
                 continue
             previous = height
             step_p, step_q = move
-            sine = hypot(*gradient) / abs(1.0 - p * gradient[0] - q * gradient[1])
             step = hypot(*move) / sqrt(1.0 + p * p + q * q)
             p += step_p
             q += step_q
-            if step <= _LAST_STEP and sine <= _PARALLEL:
+            if step <= _LAST_STEP:
                 x = nx + p * first[0] + q * second[0]
                 y = ny + p * first[1] + q * second[1]
                 z = nz + p * first[2] + q * second[2]

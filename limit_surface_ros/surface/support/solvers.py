@@ -31,8 +31,6 @@ _BESIDE = 4.0
 _TABLE_COLUMNS = 200
 # A lower peak is climbed if the table shows at least this part of the best one's power.
 _WORTH = 0.7
-# Steps by upper bounds before Newton's method: each at least halves the way to a ridge.
-_BOUND_STEPS = 6
 # Effort for the axes in which a surface is about round.
 _FRAME_POINTS = 300
 _FRAME_STEPS = 6
@@ -209,10 +207,6 @@ class PeakSearch(StartedSolver):
 
     def _climb(self, units: Floats, ellipsoids: Floats) -> Floats:
         points = np.einsum("mij,jm->im", ellipsoids, units)
-        if isinstance(self._gauge, BoundedGauge):
-            for _ in range(_BOUND_STEPS):
-                points /= np.abs(points).max(axis=0)
-                points = self._gauge.along_ellipsoids(points, units)
         points, _, _ = plane_minimum(self._gauge, units, points, np.zeros(units.shape[1]))
         return points / self._gauge.values(points)
 
