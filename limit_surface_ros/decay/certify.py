@@ -22,15 +22,17 @@ from limit_surface_ros.decay.grids import fit_times
 from limit_surface_ros.decay.targets import Analytic, PiecewiseLinear, Record
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.decay.exponential_sum import ExponentialSum
     from limit_surface_ros.decay.targets import Target
 
 # An error is proven if no more than this part of it is left open.
 TOLERANCE = 1e-3
-MOST_POINTS = 300_000
-# Parts into which an interval is cut.
-PARTS = 4
+MOST_POINTS = 1_500_000
+# Parts into which an interval is cut at most.
+MOST_PARTS = 64
 # Points, times rates, that are looked at in one piece.
 _BLOCK = 1 << 18
 
@@ -64,24 +66,53 @@ def certified_error(
     """
     times = fit_times(response, end, float(np.abs(x.rates.imag).max()))
     shape = _shape(response)
+    values, aims = x(times), response(times)
     while True:
-        values, aims = x(times), response(times)
-        errors = values - aims
-        found = float(np.abs(errors).max())
+        errors = np.abs(values - aims)
+        found = float(errors.max())
         if shape is None:
             return LargestError(found, float("inf"), len(times))
         bounds = _bounds(x, times, values, aims, shape)
-        proven = float(bounds.max())
-        open_cells = np.flatnonzero(bounds > (1.0 + tolerance) * found)
-        if len(open_cells) == 0 or len(times) > MOST_POINTS:
-            return LargestError(found, max(proven, found), len(times))
-        shares = np.arange(1, PARTS) / PARTS
-        gaps = times[open_cells + 1] - times[open_cells]
-        more = times[open_cells, np.newaxis] + np.multiply.outer(gaps, shares)
-        following = np.unique(np.concatenate([times, more.reshape(-1)]))
-        if len(following) == len(times):
-            return LargestError(found, max(proven, found), len(times))
-        times = following
+        if found == 0.0:
+            return LargestError(found, float(bounds.max()), len(times))
+        seen = np.maximum(errors[:-1], errors[1:])
+        parts = _parts(bounds, seen, found, tolerance, max(0, MOST_POINTS - len(times)))
+        more = _cuts(times, parts)
+        places = np.repeat(np.arange(1, len(times)), parts - 1)
+        new = (times[places - 1] < more) & (more < times[places])
+        if not new.any():
+            return LargestError(found, max(float(bounds.max()), found), len(times))
+        more, places = more[new], places[new]
+        times = np.insert(times, places, more)
+        values, aims = np.insert(values, places, x(more)), np.insert(aims, places, response(more))
+
+
+def _parts(
+    bounds: Floats, seen: Floats, found: float, tolerance: float, most: int
+) -> NDArray[np.intp]:
+    """Return into how many parts each interval is to be cut, at most so many more in all.
+
+    Those whose bound is too large are cut into as many as bring it down if what is open shrinks
+    with the width; where that takes too many, they are allowed more.
+    """
+    while True:
+        allowed = (1.0 + tolerance) * found
+        parts = np.ones(len(bounds), dtype=np.intp)
+        large = bounds > allowed
+        needed = np.ceil((bounds[large] - seen[large]) / (allowed - seen[large]))
+        parts[large] = np.clip(needed, 2, MOST_PARTS)
+        if parts.sum() - len(parts) <= most:
+            return parts
+        tolerance *= 2.0
+
+
+def _cuts(times: Floats, parts: NDArray[np.intp]) -> Floats:
+    """Return the times that cut each interval into so many even parts, in order."""
+    counts = parts - 1
+    firsts = np.repeat(np.cumsum(counts) - counts, counts)
+    shares = (np.arange(len(firsts)) - firsts + 1.0) / np.repeat(parts, counts)
+    cuts: Floats = np.repeat(times[:-1], counts) + shares * np.repeat(np.diff(times), counts)
+    return cuts
 
 
 def _shape(response: Target) -> str | None:

@@ -91,6 +91,17 @@ def test_no_error_hides_between_the_points_of_a_proof(shape):
         assert largest.found <= largest.proven
 
 
+@pytest.mark.parametrize("gap", [1e-3, 2e-5])
+def test_small_errors_of_monotone_responses_are_proven_too(gap):
+    x = ExponentialSum([-1.0, -3.0], [0.5, 0.5])
+
+    def function(t):
+        return x(t) + gap * np.exp(-2.0 * t) * (1.0 - t)
+
+    largest = certified_error(x, Analytic(function, shape="monotone"), 6.0)
+    assert gap * (1.0 - 1e-9) <= largest.found <= largest.proven <= 1.02 * gap
+
+
 def test_nothing_is_proven_of_what_is_not_known():
     x = ExponentialSum([-1.0], [1.0])
     assert certified_error(x, Analytic(lambda t: np.exp(-t) * np.cos(t)), 1.0).proven == np.inf
