@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import threading
 import warnings
 
 import numpy as np
@@ -30,6 +31,7 @@ from limit_surface_ros.surface.kinds.polynomial import Polynomial
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
 from node_helpers import planar_twist, wrench_message
+from process_helpers import WAIT
 
 WRENCH = [3.0, 1.0, 0.1]
 
@@ -66,6 +68,31 @@ def test_what_is_to_be_said_of_a_model_goes_into_the_log_in_plain_words(tmp_path
         ModelHost(Parameters(), read_surface_model, said.append)
     (line,) = said
     assert line.startswith("limit surface 'cross' is not convex")
+
+
+def test_reloads_that_are_asked_for_during_one_share_the_next(
+    ros, client_node, running, model_file, monkeypatch
+):
+    node, _, _, _, ask = running
+    read, reads, gate = node._read_anew, [], threading.Event()
+
+    def read_later():
+        reads.append(None)
+        gate.wait(WAIT)
+        return read()
+
+    monkeypatch.setattr(node, "_read_anew", read_later)
+    client = client_node.create_client(Trigger, "/limit_surface/reload")
+    assert client.wait_for_service(timeout_sec=WAIT)
+    futures = [client.call_async(Trigger.Request()) for _ in range(6)]
+    ros.wait(lambda: node.endpoints.under_way == len(futures))
+    changed, _ = model_file("box", seed=1)
+    gate.set()
+    for future in futures:
+        assert ros.done(future, WAIT)
+        assert future.result().success
+    assert len(reads) == 2
+    np.testing.assert_allclose(twist_now(ask), changed.surface.twist_of_wrench(WRENCH), atol=1e-12)
 
 
 def test_reload_takes_what_the_files_hold_now(running, model_file):

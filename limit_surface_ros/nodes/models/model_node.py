@@ -72,6 +72,10 @@ class ModelNode(Node, Generic[Model]):
             self.destroy_node()
             raise
         self._hosts.append(self.host)
+        # Reloads asked for, how many of them the models that are served cover, and who waits.
+        self._asked = self._covered = 0
+        self._reloading = False
+        self._for_reload: list[Waiting] = []
         peers = Peers(self)
         self.endpoints = Endpoints(self, self.health, peers)
         self.endpoints.serve_trigger("reload", self._reload, "the old models keep serving")
@@ -126,16 +130,38 @@ class ModelNode(Node, Generic[Model]):
         super().destroy_node()
 
     async def _reload(self, _: Trigger.Request, response: Trigger.Response) -> None:
-        """Read and prepare the models anew in a thread, then swap all of them in one step."""
-        version = None
-        while version != self.values.version:
-            # A parameter that is set meanwhile counts, too.
-            version = self.values.version
-            apply = await self._in_a_thread(self._read_anew)
-        apply()
+        """Read and prepare the models anew in a thread, then swap all of them in one step.
+
+        One at a time: those who ask meanwhile, as an impatient client does, share the next one.
+        """
+        self._asked += 1
+        asked = self._asked
+        while self._covered < asked:
+            if self._reloading:
+                turn = Waiting()
+                self._for_reload.append(turn)
+                await turn
+            else:
+                await self._reload_for_all()
         response.message = "; ".join(host.summary for host in self._hosts)
         response.success = True
-        self.get_logger().info(response.message)
+
+    async def _reload_for_all(self) -> None:
+        self._reloading, covered = True, self._asked
+        try:
+            version = None
+            while version != self.values.version:
+                # A parameter that is set meanwhile counts, too.
+                version = self.values.version
+                apply = await self._in_a_thread(self._read_anew)
+            apply()
+            self._covered = covered
+            self.get_logger().info("; ".join(host.summary for host in self._hosts))
+        finally:
+            self._reloading = False
+            waiting, self._for_reload = self._for_reload, []
+            for turn in waiting:
+                turn.settle()
 
     def _read_anew(self) -> Callable[[], None]:
         apply = self.values.reapply([name for host in self._hosts for name in host.names])
