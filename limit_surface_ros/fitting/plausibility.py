@@ -38,6 +38,10 @@ _CERTAIN, _GROUPS = 4.0, 10
 # length are those of pushes through the centre.
 _TURNS, _ARM, _USUAL_LENGTH = 0.05, 0.05, 0.05
 _ROUNDS = 100
+# Two columns are swapped if each follows the other's partner by more than the first correlation
+# and its own by less than the second.
+_FOLLOWS, _FOLLOWS_NOT = 0.5, 0.25
+_NAMES = (("fx", "fy", "tau"), ("vx", "vy", "omega"))
 
 # What columns may hold instead, and what turns it into what they should.
 _SLIPS: tuple[tuple[str, tuple[float, float, float]], ...] = (
@@ -109,7 +113,7 @@ def doubts_of_pairs(pairs: Pairs, characteristic_length: float | None = None) ->
         return []
     wrenches, twists = pairs.wrenches, pairs.twists
     length = characteristic_length or _USUAL_LENGTH
-    frames = _doubts_of_frames(wrenches, twists)
+    frames = _doubts_of_columns(wrenches, twists) or _doubts_of_frames(wrenches, twists)
     if frames:
         return frames
     still = _never_turns(wrenches, twists, length)
@@ -156,6 +160,33 @@ def _unit(twists: Floats, length: float) -> Floats:
     """Return unit twists in scaled variables, shape (n, 3)."""
     scaled = twists * np.array([1.0, 1.0, length])
     return np.asarray(scaled / np.linalg.norm(scaled, axis=1, keepdims=True))
+
+
+def _doubts_of_columns(wrenches: Floats, twists: Floats) -> list[Doubt]:
+    """Return that two columns of wrench or twist are swapped, by what follows what."""
+    parts = []
+    for rows in (wrenches, twists):
+        sizes = np.sqrt(np.mean(rows**2, axis=0))
+        if not (sizes > 0.0).all():
+            return []
+        # Of each pair the direction counts, with all columns alike.
+        scaled = rows / sizes
+        scaled = scaled / np.linalg.norm(scaled, axis=1, keepdims=True)
+        parts.append(scaled / np.sqrt(np.sum(scaled**2, axis=0)))
+    follows = parts[0].T @ parts[1]
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        crossed, own = (follows[i, j], follows[j, i]), (follows[i, i], follows[j, j])
+        if min(crossed) > _FOLLOWS and max(own) < _FOLLOWS_NOT:
+            loads, motions = ((names[i], names[j]) for names in _NAMES)
+            return [
+                Doubt(
+                    f"{loads[0]} follows {motions[1]} and {loads[1]} follows {motions[0]}: by all "
+                    f"appearance the columns {' and '.join(loads)}, or {' and '.join(motions)}, "
+                    "are swapped",
+                    True,
+                )
+            ]
+    return []
 
 
 def _doubts_of_frames(wrenches: Floats, twists: Floats) -> list[Doubt]:

@@ -29,9 +29,9 @@ _BLOCKS = 6
 # Curvature, relative to the largest at the same load, below which a surface bends inward.
 _INWARD = -1e-9
 # Part by which the middle of a chord is outside if that is not rounding.
-_OUTSIDE = 1e-12
-# How far to either side the counter-example goes, halved until its middle is outside.
-_REACH = 0.5
+_OUTSIDE = 2e-15
+# How far to either side counter-examples go: a dent of curvature -c is about sqrt(c) wide.
+_REACHES = 0.5 * 0.8 ** np.arange(64)
 
 
 class NotConvexWarning(UserWarning):
@@ -44,7 +44,8 @@ class Convexity:
 
     Attributes:
         convex: Whether no dent is known.
-        proved: Whether that is certain: by a theorem, or by the counter-example.
+        proved: Whether that is certain: by a theorem, by the counter-example, or for a polynomial
+            by a curvature that is negative in exact arithmetic.
         reason: In words.
         dented_share: Share of the directions of load in which the surface bends inward.
         counter_example: Two wrenches on the surface whose mean lies outside it, shape (2, 3);
@@ -78,19 +79,23 @@ def is_convex(surface: LimitSurface) -> Convexity:
     relative = np.concatenate([_least_curvature(_hessians(gauge, block)) for block in blocks])
     share = float((relative < _INWARD).mean())
     worst = directions[relative.argmin()]
+    across, certain = None, False
     if isinstance(gauge, Quartic):
-        value, load, _ = lowest_curvature(gauge, directions[:: len(directions) // _DESCENTS].T)
+        value, load, along = lowest_curvature(gauge, directions[:: len(directions) // _DESCENTS].T)
         if value < 0.0:
-            worst = load
+            worst, across = load, along
+            certain = gauge.exact_curvature(load, along) < 0
             # A dent that lies between the directions.
             share = share or 0.5 / _DIRECTIONS
     if share == 0.0:
         reason = f"no direction of {_DIRECTIONS} has a negative curvature"
         return Convexity(True, False, reason, 0.0, None)
-    hessian = _hessians(gauge, worst[np.newaxis])[:, :, 0]
-    chord = _outer_chord(surface, worst, np.linalg.eigh(hessian)[1][:, 0])
+    if across is None:
+        hessian = _hessians(gauge, worst[np.newaxis])[:, :, 0]
+        across = np.linalg.eigh(hessian)[1][:, 0]
+    chord = _outer_chord(surface, worst, across)
     reason = f"it bends inward in {100.0 * share:.2g} % of the directions of load"
-    return Convexity(False, chord is not None, reason, share, chord)
+    return Convexity(False, certain or chord is not None, reason, share, chord)
 
 
 def _by_chords(surface: LimitSurface, directions: Floats) -> Convexity:
@@ -147,12 +152,10 @@ def _least_curvature(hessians: Floats) -> Floats:
 
 
 def _outer_chord(surface: LimitSurface, load: Floats, across: Floats) -> Floats | None:
-    """Return the ends (2, 3) of a chord whose middle is outside, None if none is found."""
-    reach = _REACH
-    while reach > 1e-6:
-        ends = (load + np.array([[reach], [-reach]]) * across) * surface.scaling.wrench_unit
-        ends /= surface.load_factor(ends)[:, np.newaxis]
-        if surface.load_factor(ends.mean(axis=0)) > 1.0 + _OUTSIDE:
-            return np.asarray(ends)
-        reach *= 0.5
-    return None
+    """Return the ends (2, 3) of the chord whose middle is farthest out, None if none is out."""
+    steps = _REACHES[:, np.newaxis] * across
+    ends = np.array([load + steps, load - steps]) * surface.scaling.wrench_unit
+    ends /= surface.load_factor(ends)[..., np.newaxis]
+    factors = surface.load_factor(ends.mean(axis=0))
+    best = int(factors.argmax())
+    return np.asarray(ends[:, best]) if factors[best] > 1.0 + _OUTSIDE else None

@@ -115,3 +115,19 @@ def test_pushes_that_never_turn_the_body_are_named(omega):
 
 def test_few_pairs_show_nothing():
     assert texts(pushes(5)) == []
+
+
+@pytest.mark.parametrize("first, second", [(0, 1), (0, 2), (1, 2)])
+@pytest.mark.parametrize("part", ["wrench", "twist"])
+@pytest.mark.parametrize("size", [0.1, 1.0, 10.0])
+def test_two_swapped_columns_are_named(first, second, part, size):
+    order = [0, 1, 2]
+    order[first], order[second] = second, first
+    sound = pushes(size=size)
+    swapped = (
+        Pairs(sound.wrenches[:, order], sound.twists)
+        if part == "wrench"
+        else Pairs(sound.wrenches, sound.twists[:, order])
+    )
+    names = [["fx", "fy", "tau"][place] for place in (first, second)]
+    assert f"the columns {' and '.join(names)}, or" in texts(swapped)[0]

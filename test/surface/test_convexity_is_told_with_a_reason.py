@@ -65,3 +65,16 @@ def test_a_dented_model_warns_with_its_share_and_a_convex_one_does_not():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         warn_unless_convex(is_convex(Polynomial(SPHERE)), "ball")
+
+
+@pytest.mark.parametrize("depth", [1e-5, 1e-6, 1e-7])
+def test_a_shallow_dent_is_proved(depth):
+    # x^4 + y^4 + m^4 is flat along its axes, and less a little of x^2 y^2 bends inward there.
+    surface = Polynomial([1, 0, 0, -depth, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1], Scaling(0.1, 3.0))
+    convexity = is_convex(surface)
+    assert not convexity.convex
+    assert convexity.proved
+    if depth > 2e-7:
+        # The middle of a chord is out by about depth^2 / 16, more than rounding.
+        middle = convexity.counter_example.mean(axis=0)
+        assert 1e-2 * depth**2 < surface.load_factor(middle) - 1.0 < depth**2

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -93,6 +94,22 @@ class Quartic:
         """Return the Hessian (3, 3, m) of P at loads (3, m)."""
         hessian: Floats = self.second.reshape(9, 6) @ _quadratics(loads)
         return hessian.reshape(3, 3, -1)
+
+    def exact_curvature(self, load: Floats, along: Floats) -> Fraction:
+        """Return v' (Hessian of P at f) v of a load f (3,) and a direction v (3,), not rounded."""
+        f, v = ([Fraction(x) for x in each.tolist()] for each in (load, along))
+        total = Fraction(0)
+        for coefficient, powers in zip(self._coefficients.tolist(), MONOMIALS.tolist(), strict=True):
+            for i, j in product(range(3), repeat=2):
+                left = list(powers)
+                factor = left[i]
+                left[i] -= 1
+                factor *= left[j]
+                left[j] -= 1
+                if factor:
+                    part = Fraction(coefficient) * factor * v[i] * v[j]
+                    total += part * f[0] ** left[0] * f[1] ** left[1] * f[2] ** left[2]
+        return total
 
     def lowest(self, loads: Floats) -> Floats:
         """Return the unit load (3,) of the lowest P that descents from loads (3, m) lead to."""
