@@ -15,7 +15,7 @@ import numpy as np
 from limit_surface_ros.errors import DataError
 from limit_surface_ros.surface.gauges.gauge import Turning
 from limit_surface_ros.surface.gauges.jacobians import of_support
-from limit_surface_ros.surface.gauges.scalar_jacobians import support_hessian
+from limit_surface_ros.surface.gauges.scalar_jacobians import moved_point, support_hessian
 from limit_surface_ros.surface.linalg import of_unit_length
 
 if TYPE_CHECKING:
@@ -166,8 +166,7 @@ class GaugeShape(Shape):
 
     def loads_turning(self, motions: Floats) -> tuple[Floats, Floats, Bools]:
         """Return loads and their derivatives; see `Shape`."""
-        loads = self.loads(motions)
-        return (loads, *of_support(motions, loads, self._gauge))
+        return of_support(motions, self.loads(motions), self._gauge)
 
     def motion_turning_scalar(self, load: Vector) -> tuple[float, Vector, Six] | None:
         """Return the same for one load; see `Shape`."""
@@ -176,8 +175,7 @@ class GaugeShape(Shape):
     def load_turning_scalar(self, motion: Vector) -> tuple[Vector, Six] | None:
         """Return the same for one motion; see `Shape`."""
         load = self.load_scalar(motion)
-        matrix = None if load is None else _of_support_scalar(self._scalar, motion, load)
-        return None if load is None or matrix is None else (load, matrix)
+        return None if load is None else _of_support_scalar(self._scalar, motion, load)
 
     def load_factor_scalar(self, load: Vector) -> float | None:
         """Return the load factor of one load; see `Shape`."""
@@ -260,7 +258,8 @@ class DissipationShape(Shape):
         if free.any():
             # Nothing resists these motions, and they are the same for all loads nearby.
             return self._turning_of_free(loads, motions, factors, free)
-        matrices, whole = of_support(loads, motions, self.dissipation)
+        motions, matrices, whole = of_support(loads, motions, self.dissipation)
+        factors = np.einsum("im,im->m", loads, motions)
         return Turning(factors, motions, matrices, None), whole
 
     def _turning_of_free(
@@ -284,9 +283,8 @@ class DissipationShape(Shape):
         found = self.load_factor_and_motion_scalar(load)
         if found is None or self._scalar is None:
             return None
-        factor, motion = found
-        matrix = _of_support_scalar(self._scalar, load, motion)
-        return None if matrix is None else (factor, motion, matrix)
+        turning = _of_support_scalar(self._scalar, load, found[1])
+        return None if turning is None else (found[0], *turning)
 
     def load_turning_scalar(self, motion: Vector) -> tuple[Vector, Six] | None:
         """Return the same for one motion; see `Shape`."""
@@ -305,9 +303,21 @@ def _is_smooth(turning: Turning) -> Bools:
     return np.asarray(~turning.kinks.any(axis=0))
 
 
-def _of_support_scalar(gauge: ScalarGauge, normal: Vector, point: Vector) -> Six | None:
-    """Return the Hessian of a support function, whose point is known; None if it needs care."""
+def _of_support_scalar(
+    gauge: ScalarGauge, normal: Vector, point: Vector
+) -> tuple[Vector, Six] | None:
+    """Return what `of_support` does for one normal, None if it needs care."""
     found = gauge.turning(point)
     if found is None:
-        return _STILL if gauge.is_vertex(point) else None
-    return support_hessian(normal, point, found[1], found[2])
+        return (point, _STILL) if gauge.is_vertex(point) else None
+    matrix = support_hessian(normal, point, found[1], found[2])
+    moved = None if matrix is None else moved_point(normal, point, found[1], matrix)
+    if moved is None:
+        return None if matrix is None else (point, matrix)
+    found = gauge.turning(moved)
+    if found is None:
+        return None
+    x, y, z = moved
+    point = (x / found[0], y / found[0], z / found[0])
+    matrix = support_hessian(normal, point, found[1], found[2])
+    return None if matrix is None else (point, matrix)

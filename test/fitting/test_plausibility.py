@@ -117,7 +117,7 @@ def test_few_pairs_show_nothing():
     assert texts(pushes(5)) == []
 
 
-@pytest.mark.parametrize("first, second", [(0, 1), (0, 2), (1, 2)])
+@pytest.mark.parametrize(("first", "second"), [(0, 1), (0, 2), (1, 2)])
 @pytest.mark.parametrize("part", ["wrench", "twist"])
 @pytest.mark.parametrize("size", [0.1, 1.0, 10.0])
 def test_two_swapped_columns_are_named(first, second, part, size):

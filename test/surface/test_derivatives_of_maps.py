@@ -56,9 +56,13 @@ def test_jacobians_are_what_differences_tend_to(name):
         assert error.max() < 1e-5
 
 
+@pytest.mark.parametrize("prepared", [False, True])
 @pytest.mark.parametrize("name", SMOOTH)
-def test_conjugate_gauges_have_inverse_curvatures(name):
-    surface = MODELS[name]
+def test_conjugate_gauges_have_inverse_curvatures(name, prepared):
+    surface = MODELS[name].scaled(1.0)
+    if prepared:
+        # Points that are read from a table are made as exact as others.
+        surface.prepare()
     wrenches = vectors(name, 2000)[:-2] * [1.0, 1.0, RHO]
     kappa, k = surface.quadratic_twist(wrenches)
     # K w = kappa, and kappa is g times its gradient.
@@ -74,8 +78,7 @@ def test_conjugate_gauges_have_inverse_curvatures(name):
     m = load[:, :, np.newaxis] * load[:, np.newaxis]
     m += dissipation[:, np.newaxis, np.newaxis] * second
     one = scaled(k @ m, V, V) - np.eye(3)
-    assert np.median(np.abs(one).max(axis=(1, 2))) < 1e-11
-    assert np.quantile(np.abs(one).max(axis=(1, 2)), 0.99) < 1e-6
+    assert np.abs(one).max() < 1e-12
 
 
 @pytest.mark.parametrize("name", MODELS)

@@ -36,6 +36,8 @@ FACET = 1e-9
 # Square of the sine of the angle between a normal and that of its point from which a kink is near,
 # and the norm of its term, relative to what it could be.
 PARALLEL = 1e-14
+# The same of a point that is as right as rounding lets it be.
+ROUNDED = 1e-27
 _BESIDE = 1e-6
 # One over the curvature that stands for that of a kink.
 _SOFTNESS = 1e-12
@@ -131,11 +133,11 @@ def gradients_and_hessians(points: Floats, turning: Turning) -> tuple[Floats, Fl
     return normals * weight, hessians
 
 
-def of_support(normals: Floats, points: Floats, gauge: Gauge) -> tuple[Floats, Bools]:
-    """Return the Hessians (6, m) of a support function, and where they are whole (m,).
+def of_support(normals: Floats, points: Floats, gauge: Gauge) -> tuple[Floats, Floats, Bools]:
+    """Return support points, the support function's Hessians (6, m), and where they are whole.
 
     Where a surface is flat in one direction, the Hessian is infinite in that, and what is returned
-    is the rest.
+    is the rest. Points from a table are first brought to where rounding leaves them.
 
     Args:
         normals: n, shape (3, m).
@@ -144,17 +146,34 @@ def of_support(normals: Floats, points: Floats, gauge: Gauge) -> tuple[Floats, B
     """
     turning = gauge.turning(points)
     found, whole = _of_turning(normals, points, turning)
+    off, squares = _off(normals, points, turning)
+    beside = squares > PARALLEL
+    if squares.max(initial=0.0) > ROUNDED:
+        # The Hessian takes the way between two normals to that between their points.
+        step = products(found, off)
+        smooth = ~beside & whole
+        if turning.kinks is not None:
+            smooth &= ~turning.kinks.any(axis=0)
+        step *= smooth
+        points = points - step
+        turning = gauge.turning(points)
+        points /= turning.values
+        found, whole = _of_turning(normals, points, turning)
     # A normal that is not that of its point is one of many at a kink, which is not quite met.
+    if beside.any():
+        at = np.flatnonzero(beside)
+        near, normals = points.take(at, axis=1), normals.take(at, axis=1)
+        found[:, at], whole[at] = _of_turning(normals, near, gauge.turning(near, _BESIDE))
+    return points, found, whole
+
+
+def _off(normals: Floats, points: Floats, turning: Turning) -> tuple[Floats, Floats]:
+    """Return the points' own normals less those wanted (3, m), and their squares in parts."""
     along = np.einsum("im,im->m", normals, points)
     along /= np.einsum("im,im->m", turning.normals, points)
     off = turning.normals * along
     off -= normals
-    beside = np.einsum("im,im->m", off, off) > PARALLEL * squared_lengths(normals)
-    if beside.any():
-        at = np.flatnonzero(beside)
-        normals, points = normals.take(at, axis=1), points.take(at, axis=1)
-        found[:, at], whole[at] = _of_turning(normals, points, gauge.turning(points, _BESIDE))
-    return found, whole
+    return off, np.einsum("im,im->m", off, off) / squared_lengths(normals)
 
 
 def _of_turning(normals: Floats, points: Floats, turning: Turning) -> tuple[Floats, Bools]:
@@ -214,18 +233,31 @@ def _twice_crossed(normals: Floats, six: Floats) -> Floats:
     """Return [n] K [n]' in six rows (6, m)."""
     x, y, z = normals
     a, b, c, d, e, f = six
-    # The rows of [n] K, each entry that is needed.
-    first_y, first_z = y * e - z * d, y * f - z * e
-    second_x, second_z = z * a - x * c, z * c - x * f
-    third_x, third_y = x * b - y * a, x * d - y * b
-    first_x, second_y = y * c - z * b, z * b - x * e
+    part = np.empty_like(x)
+
+    def difference(out: Floats, first: Floats, by: Floats, second: Floats, and_by: Floats) -> None:
+        np.multiply(first, by, out=out)
+        np.multiply(second, and_by, out=part)
+        out -= part
+
+    # Rows of [n] K, each entry that is needed, and these times [n]'.
+    rows = np.empty((3, *x.shape))
+    p, q, r = rows
     found = np.empty_like(six)
-    np.subtract(y * first_z, z * first_y, out=found[0])
-    np.subtract(z * first_x, x * first_z, out=found[1])
-    np.subtract(x * first_y, y * first_x, out=found[2])
-    np.subtract(z * second_x, x * second_z, out=found[3])
-    np.subtract(x * second_y, y * second_x, out=found[4])
-    np.subtract(x * third_y, y * third_x, out=found[5])
+    difference(p, y, c, z, b)
+    difference(q, y, e, z, d)
+    difference(r, y, f, z, e)
+    difference(found[0], y, r, z, q)
+    difference(found[1], z, p, x, r)
+    difference(found[2], x, q, y, p)
+    difference(p, z, a, x, c)
+    difference(q, z, b, x, e)
+    difference(r, z, c, x, f)
+    difference(found[3], z, p, x, r)
+    difference(found[4], x, q, y, p)
+    difference(p, x, b, y, a)
+    difference(q, x, d, y, b)
+    difference(found[5], x, q, y, p)
     return found
 
 

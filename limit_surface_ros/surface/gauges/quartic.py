@@ -99,7 +99,9 @@ class Quartic:
         """Return v' (Hessian of P at f) v of a load f (3,) and a direction v (3,), not rounded."""
         f, v = ([Fraction(x) for x in each.tolist()] for each in (load, along))
         total = Fraction(0)
-        for coefficient, powers in zip(self._coefficients.tolist(), MONOMIALS.tolist(), strict=True):
+        for coefficient, powers in zip(
+            self._coefficients.tolist(), MONOMIALS.tolist(), strict=True
+        ):
             for i, j in product(range(3), repeat=2):
                 left = list(powers)
                 factor = left[i]

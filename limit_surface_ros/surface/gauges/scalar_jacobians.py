@@ -6,7 +6,7 @@ from __future__ import annotations
 from math import sqrt
 from typing import TYPE_CHECKING
 
-from limit_surface_ros.surface.gauges.jacobians import FACET, FLAT, PARALLEL
+from limit_surface_ros.surface.gauges.jacobians import FACET, FLAT, PARALLEL, ROUNDED
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -90,3 +90,28 @@ def support_hessian(normal: Vector, point: Vector, gauge_normal: Vector, six: Si
     if trace * factor * power <= FACET * (p * p + q * q + r * r):
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     return xx * factor, xy * factor, xz * factor, yy * factor, yz * factor, zz * factor
+
+
+def moved_point(normal: Vector, point: Vector, gauge_normal: Vector, six: Six) -> Vector | None:
+    """Return where a support point belongs that is not as exact as it can be, None if it is.
+
+    Args:
+        normal: n.
+        point: x, all but the support point of n.
+        gauge_normal: N of the gauge there.
+        six: What `support_hessian` makes of them.
+    """
+    x, y, z = normal
+    p, q, r = point
+    a, b, c = gauge_normal
+    k = (x * p + y * q + z * r) / (a * p + b * q + c * r)
+    off = (k * a - x, k * b - y, k * c - z)
+    if product_of(off, off) <= ROUNDED * product_of(normal, normal):
+        return None
+    u, v, w = product(six, off)
+    return p - u, q - v, r - w
+
+
+def product_of(first: Vector, second: Vector) -> float:
+    """Return a.b."""
+    return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
