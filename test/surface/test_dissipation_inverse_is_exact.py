@@ -131,3 +131,23 @@ def test_loads_far_from_one_newton_are_solved_alike():
         np.testing.assert_allclose(
             contacts.load_factor(size * loads), size * contacts.load_factor(loads), rtol=1e-12
         )
+
+
+@pytest.mark.parametrize("rest", [1e-14, 1e-12, 1e-9, 1e-6, 1e-3])
+def test_corners_that_are_a_little_round_are_solved_in_plain_floats(rest):
+    # Matrices nearly of rank two: within what would be facets motions all but stay.
+    rng = np.random.default_rng(7)
+    roots = rng.standard_normal((3, 2, 3))
+    forms = np.swapaxes(roots, 1, 2) @ roots
+    sizes = np.trace(forms, axis1=1, axis2=2)[:, np.newaxis, np.newaxis]
+    surface = Dissipation(forms + rest * sizes * np.eye(3))
+    loads = rng.standard_normal((200, 3))
+    factors, motions = zip(
+        *map(surface.shape.load_factor_and_motion_scalar, loads.tolist()), strict=True
+    )
+    # None is left to the solver of columns, and each has all the power that there is.
+    motions = np.array(motions)
+    resisted = surface.shape.dissipation.values(motions.T)
+    np.testing.assert_allclose((motions * loads).sum(axis=1) / resisted, factors, rtol=1e-12)
+    np.testing.assert_allclose(factors, surface.load_factor(loads), rtol=1e-12)
+    assert_in_normal_cones(surface, loads)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,31 +19,42 @@ _NO_POWER = 1e-60
 _ELEMENTS = 2**14
 # Curvature below which a surface counts as flat beside a corner.
 FLAT = 1e-3
+_STEPS = 30
 
 
 @dataclass(frozen=True)
 class Corners:
-    """Pairs of opposite points x_k and -x_k where one norm |R_k x| of a convex sum is zero.
+    """Pairs of opposite points x_k and -x_k where one norm |R_k x| of a convex sum is all but zero.
 
     There that norm has any gradient R_k' y with |y| <= 1 beside the gradient c_k of the rest, so
     that the normals at x_k fill a cone over an ellipse. For a dissipation, x_k is the rotation
     about a support point and the ellipse is a facet of the set of loads.
+
+    Where the norm is not quite zero, as with a matrix that is nearly of rank two, the corner is
+    round: beside it the norm is sqrt(|y|^2 + width^2) in y = R_k (x - x_k).
 
     Attributes:
         points: x_k, scaled so that c_k.x_k = 1, shape (q, 3).
         inverses: G_k with G_k R_k' = 1, shape (q, 2, 3).
         centres: G_k c_k, shape (q, 2).
         curvatures: G_k H_k G_k' with the Hessian H_k of the rest, shape (q, 2, 2).
+        widths: |R_k x_k|, shape (q,).
     """
 
     points: Floats
     inverses: Floats
     centres: Floats
     curvatures: Floats
+    widths: Floats
 
     @classmethod
     def of_norms(
-        cls, points: Floats, roots: Floats, gradients: Floats, hessians: Floats
+        cls,
+        points: Floats,
+        roots: Floats,
+        gradients: Floats,
+        hessians: Floats,
+        widths: Floats | None = None,
     ) -> Corners | None:
         """Return the corners of a sum at the zeros of its norms, None if there are none.
 
@@ -51,15 +63,18 @@ class Corners:
             roots: R_k of these norms, shape (q, 2, 3).
             gradients: Gradients of the rest at the points, shape (3, q).
             hessians: Hessians of the rest at the points, shape (3, 3, q).
+            widths: The norms at the points, shape (q,); all zero if not given.
         """
         if len(points) == 0:
             return None
         inverses = np.asarray(np.linalg.pinv(roots), dtype=np.float64).transpose(0, 2, 1)
+        powers = (gradients.T * points).sum(axis=1)
         return cls(
-            points / (gradients.T * points).sum(axis=1)[:, np.newaxis],
+            points / powers[:, np.newaxis],
             inverses,
             np.einsum("qij,jq->qi", inverses, gradients),
             inverses @ np.moveaxis(hessians, -1, 0) @ np.swapaxes(inverses, 1, 2),
+            np.zeros(len(points)) if widths is None else widths / powers,
         )
 
     def nearest(self, normals: Floats) -> tuple[Floats, Floats]:
@@ -70,14 +85,17 @@ class Corners:
 
         Returns:
             Distances (m,) from the axis of the cone in its own radii, at most 1 within it; and
-            points (3, m), not scaled: exact within the cone, of second order beyond.
+            points (3, m), not scaled: exact within the cone, of second order beyond, and about
+            round corners, of which none is within the cone.
         """
         distance, points, which = self._cones(normals)
-        beyond = np.flatnonzero(distance > 1.0)
+        wide = self.widths[which] > 0.0
+        beyond = np.flatnonzero((distance > 1.0) | wide)
         if len(beyond):
             points[:, beyond] += self._offsets(
                 which[beyond], normals.take(beyond, axis=1), distance[beyond]
             )
+            distance[wide] = np.maximum(distance[wide], 1.0 + 2.0 * RIM)
         return distance, points
 
     def _cones(self, normals: Floats) -> tuple[Floats, Floats, Places]:
@@ -113,7 +131,7 @@ class Corners:
         """Return the steps (3, m) from corners to the points to expect beyond their cones.
 
         To second order the gauge beside a corner is |y| - q.y + y'My/2 in y = R_k (x - x_k), which
-        is least near y along q.
+        is least near y along q; see `reach` for the way.
         """
         corners = self.points.T.take(which, axis=1)
         powers = (corners * normals).sum(axis=0)
@@ -122,8 +140,33 @@ class Corners:
         inverses = np.moveaxis(self.inverses, 0, -1).take(which, axis=2)
         q = (inverses * normals).sum(axis=1) - self.centres.T.take(which, axis=1)
         matrices = np.moveaxis(self.curvatures, 0, -1).take(which, axis=2)
-        curvature = ((matrices * q).sum(axis=1) * q).sum(axis=0) + FLAT * distance**2
-        y = q * ((distance - 1.0) * distance / curvature)
+        square = (q * q).sum(axis=0)
+        square[square == 0.0] = _NO_POWER
+        curvature = ((matrices * q).sum(axis=1) * q).sum(axis=0) / square + FLAT
+        lengths = np.sqrt(square)
+        y = (distance - 1.0) / curvature
+        widths = self.widths.take(which)
+        for column in np.flatnonzero(widths):
+            y[column] = reach(
+                float(lengths[column]), float(curvature[column]), float(widths[column])
+            )
+        y = q * (y / lengths)
         steps = (inverses * y[:, np.newaxis]).sum(axis=0)
         steps -= corners * (normals * steps).sum(axis=0)
         return np.asarray(steps * np.sign(powers))
+
+
+def reach(distance: float, curvature: float, width: float) -> float:
+    """Return the t above 0 with t / sqrt(t^2 + width^2) + curvature t = distance.
+
+    That is how far from a round corner the gradient of norm and rest is the one wanted.
+    """
+    # Newton's method rises to the root of a concave function from any place below.
+    t = max(0.0, (distance - 1.0) / curvature)
+    for _ in range(_STEPS):
+        norm = sqrt(t * t + width * width)
+        step = (distance - t / norm - curvature * t) / (width * width / norm**3 + curvature)
+        t += step
+        if step <= 1e-3 * t:
+            break
+    return t

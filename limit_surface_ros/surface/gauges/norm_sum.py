@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 KINK = 1e-14
 # Two zeros of norms closer than this, in parts of a norm's size, are one.
 _APART = 1e-9
+# Part of a norm's larger sizes that its least one is of a corner that is only a little round.
+_ROUND = 1e-2
 # Elements of one array of points by motions, of which several stay in the processor's cache.
 _ELEMENTS = 2**14
 
@@ -121,16 +123,29 @@ class NormSum:
         return Turning(values, normals, matrices, kinks)
 
     def corners(self) -> Corners | None:
-        """Return the zeros of each norm of rank two that are no other norm's."""
-        flat = np.abs(self._roots).any(axis=2).sum(axis=1) == 2
-        roots = self._roots[flat][:, :2]
-        kinks = np.cross(roots[:, 0], roots[:, 1])
-        kinks /= np.linalg.norm(kinks, axis=1, keepdims=True)
-        rest = np.linalg.norm(self._roots @ kinks.T, axis=1) > _APART * self._sizes[:, np.newaxis]
-        alone = rest.sum(axis=0) == len(self._roots) - 1
-        kinks, roots = kinks[alone], roots[alone]
-        _, gradients, hessians = self.derivatives(kinks.T, np.zeros(len(kinks)))
-        return Corners.of_norms(kinks, roots, gradients, hessians)
+        """Return where each norm of rank two, or nearly so, is least, if no other is zero there."""
+        if len(self._roots) == 1:
+            return None
+        _, singular, axes = np.linalg.svd(self._roots)
+        flat = np.flatnonzero(
+            (singular[:, 1] > _APART * singular[:, 0]) & (singular[:, 2] < _ROUND * singular[:, 1])
+        )
+        exact = np.abs(self._roots[flat]).any(axis=2).sum(axis=1) == 2
+        widths = np.where(exact, 0.0, singular[flat, 2])
+        roots = singular[flat, :2, np.newaxis] * axes[flat, :2]
+        kinks = axes[flat, 2]
+        norms = np.linalg.norm(self._roots @ kinks.T, axis=1)
+        norms[flat, np.arange(len(flat))] = 0.0
+        alone = (norms > _APART * self._sizes[:, np.newaxis]).sum(axis=0) == len(self._roots) - 1
+        gradients: Floats = np.zeros((3, len(flat)))
+        hessians: Floats = np.zeros((3, 3, len(flat)))
+        for place in np.flatnonzero(alone):
+            rest = NormSum(np.delete(self._roots, flat[place], axis=0))
+            _, gradient, hessian = rest.derivatives(kinks[place][:, np.newaxis], np.zeros(1))
+            gradients[:, place], hessians[:, :, place] = gradient[:, 0], hessian[:, :, 0]
+        return Corners.of_norms(
+            kinks[alone], roots[alone], gradients[:, alone], hessians[:, :, alone], widths[alone]
+        )
 
 
 class PointNormSum:

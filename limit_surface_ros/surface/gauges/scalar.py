@@ -114,15 +114,17 @@ class NormSumScalar:
         self, normal: Vector, first: Vector, second: Vector
     ) -> Callable[[float, float], PlaneStep | None]:
         """Return the sum's logarithm in a plane; see `ScalarGauge`."""
-        forms = [_in_plane(norm, normal, first, second) for norm in self._norms]
+        forms = [(norm, *_in_plane(norm, normal, first, second)) for norm in self._norms]
 
         def step(p: float, q: float) -> PlaneStep | None:
             gauge = g1 = g2 = h11 = h12 = h22 = 0.0
-            for q0, b1, b2, a11, a12, a22 in forms:
+            for term, q0, b1, b2, a11, a12, a22 in forms:
                 c1, c2 = b1 + a11 * p + a12 * q, b2 + a12 * p + a22 * q
                 value = q0 + p * (b1 + c1) + q * (b2 + c2)
                 if not value > _SMALL * (q0 + a11 * p * p + a22 * q * q):
-                    return None
+                    value, c1, c2 = _by_root(term, normal, first, second, p, q)
+                    if value == 0.0:
+                        return None
                 norm = sqrt(value)
                 gauge += norm
                 weight = 1.0 / norm
@@ -429,6 +431,29 @@ def _in_plane(norm: Norm, normal: Vector, first: Vector, second: Vector) -> Plan
         p0 * q0 + p1 * q1 + p2 * q2,
         q0 * q0 + q1 * q1 + q2 * q2,
     )
+
+
+def _by_root(
+    norm: Norm, normal: Vector, first: Vector, second: Vector, p: float, q: float
+) -> tuple[float, float, float]:
+    """Return the square of a norm in a plane, and half its derivatives by p and q.
+
+    From the images of the vectors, which keep the digits of a small norm. A square that is zero
+    but for rounding is exactly that.
+    """
+    least, a, b, c, d, e, f, g, h, i = norm
+    x, y, z = (n + p * r + q * s for n, r, s in zip(normal, first, second, strict=True))
+    u, v, w = a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
+    value = u * u + v * v + w * w
+    if not least * (x * x + y * y + z * z) < value:
+        return 0.0, 0.0, 0.0
+    x, y, z = first
+    along = u * (a * x + b * y + c * z) + v * (d * x + e * y + f * z) + w * (g * x + h * y + i * z)
+    x, y, z = second
+    across = (
+        u * (a * x + b * y + c * z) + v * (d * x + e * y + f * z) + w * (g * x + h * y + i * z)
+    )
+    return value, along, across
 
 
 def _newton_move(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from limit_surface_ros.surface.gauges.corners import FLAT, RIM
+from limit_surface_ros.surface.gauges.corners import FLAT, RIM, reach
 from limit_surface_ros.surface.support.solvers import SupportSolver
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ class _Corner(NamedTuple):
     inverse: list[list[float]]
     centre: list[float]
     curvature: list[list[float]]
+    width: float
 
 
 class SmallBatch(SupportSolver):
@@ -70,6 +71,7 @@ class SmallBatch(SupportSolver):
                     corners.inverses.tolist(),
                     corners.centres.tolist(),
                     corners.curvatures.tolist(),
+                    corners.widths.tolist(),
                     strict=True,
                 )
             ]
@@ -177,12 +179,17 @@ class SmallBatch(SupportSolver):
         sign = 1.0 if power > 0.0 else -1.0
         distance = sqrt(least)
         x, y, z = corner.point
-        if distance <= 1.0 + RIM:
+        if distance <= 1.0 + RIM and corner.width == 0.0:
             return (sign * x, sign * y, sign * z), True
         (m00, m01), (m10, m11) = corner.curvature
-        curvature = q0 * (m00 * q0 + m01 * q1) + q1 * (m10 * q0 + m11 * q1) + FLAT * least
-        reach = (distance - 1.0) * distance / curvature
-        y0, y1 = reach * q0, reach * q1
+        if least == 0.0:
+            return (sign * x, sign * y, sign * z), False
+        curvature = (q0 * (m00 * q0 + m01 * q1) + q1 * (m10 * q0 + m11 * q1)) / least + FLAT
+        if corner.width > 0.0:
+            part = reach(distance, curvature, corner.width) / distance
+        else:
+            part = (distance - 1.0) / (curvature * distance)
+        y0, y1 = part * q0, part * q1
         first, second = corner.inverse
         steps = [y0 * a + y1 * b for a, b in zip(first, second, strict=True)]
         back = 1.0 - _product(steps, unit) / power
