@@ -123,7 +123,7 @@ class NormSum:
         return Turning(values, normals, matrices, kinks)
 
     def corners(self) -> Corners | None:
-        """Return where each norm of rank two, or nearly so, is least, if no other is zero there."""
+        """Return where each norm of rank two, or nearly so, is least and no other is zero."""
         if len(self._roots) == 1:
             return None
         _, singular, axes = np.linalg.svd(self._roots)
