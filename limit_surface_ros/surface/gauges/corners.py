@@ -24,7 +24,7 @@ _STEPS = 30
 
 @dataclass(frozen=True)
 class Corners:
-    """Pairs of opposite points x_k and -x_k where one norm |R_k x| of a convex sum is all but zero.
+    """Opposite points x_k and -x_k where one norm |R_k x| of a convex sum is all but zero.
 
     There that norm has any gradient R_k' y with |y| <= 1 beside the gradient c_k of the rest, so
     that the normals at x_k fill a cone over an ellipse. For a dissipation, x_k is the rotation
