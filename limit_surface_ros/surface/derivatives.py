@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,9 +17,14 @@ from limit_surface_ros.surface.gauges.jacobians import (
 from limit_surface_ros.surface.scaling import InScaledVariables, write_rows
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Bools, Floats
+
+# How far beside a vector its map is looked at for a rim, and by how much it then moves.
+_BESIDE, _MOVED = 1e-7, 1e-10
 
 
 class Derivatives(InScaledVariables):
@@ -131,20 +137,47 @@ class Derivatives(InScaledVariables):
         return wrenches.reshape(array.shape), jacobians.reshape(*array.shape, 3)
 
     def is_smooth_at(self, wrench: ArrayLike) -> Bools:
-        """Whether `twist_of_wrench` has a derivative at wrenches (..., 3); shape (...)."""
+        """Whether `twist_of_wrench` has a derivative at wrenches (..., 3); shape (...).
+
+        It has none at loads that a term does not see, and at the rims of facets, where the
+        Jacobian is that of the inside.
+        """
         array = as_rows("wrench", wrench)
         smooth = np.empty(array.size // 3, dtype=bool)
         for block, columns, _ in self._blocks("wrench", array, self.scaling.wrench_unit):
-            smooth[block] = self.shape.motions_turning(columns)[1]
+            turning, whole = self.shape.motions_turning(columns)
+            still = ~turning.matrices.any(axis=0)
+            smooth[block] = whole & ~_at_rims(self.shape.motions, columns, still & whole)
         return smooth.reshape(array.shape[:-1])
 
     def wrench_is_smooth_at(self, twist: ArrayLike) -> Bools:
-        """Whether `wrench_of_twist` has a derivative at twists (..., 3); shape (...)."""
+        """Whether `wrench_of_twist` has a derivative at twists (..., 3); shape (...).
+
+        It has none at rotations about support points, and at the rims of what stays at a corner.
+        """
         array = as_rows("twist", twist)
         smooth = np.empty(array.size // 3, dtype=bool)
         for block, columns, _ in self._blocks("twist", array, self.scaling.twist_unit):
-            smooth[block] = self.shape.loads_turning(columns)[2]
+            _, matrices, whole = self.shape.loads_turning(columns)
+            still = ~matrices.any(axis=0)
+            smooth[block] = whole & ~_at_rims(self.shape.loads, columns, still & whole)
         return smooth.reshape(array.shape[:-1])
+
+
+def _at_rims(kernel: Callable[[Floats], Floats], columns: Floats, still: Bools) -> Bools:
+    """Tell where a map that stands still at some columns (3, m) does not do so beside them."""
+    rims = np.zeros_like(still)
+    at = np.flatnonzero(still)
+    if len(at):
+        here = columns.take(at, axis=1)
+        answers = kernel(here)
+        reach = _BESIDE * np.abs(here).max(axis=0)
+        for axis, sign in itertools.product(range(3), (1.0, -1.0)):
+            near = here.copy()
+            near[axis] += sign * reach
+            away = np.abs(kernel(near) - answers).max(axis=0)
+            rims[at] |= away > _MOVED * np.abs(answers).max(axis=0)
+    return rims
 
 
 def _write_symmetric(six: Floats, units: Floats, out: Floats) -> None:

@@ -216,3 +216,24 @@ def test_one_vector_has_the_derivatives_of_many(name):
         assert np.allclose([value for value, _ in each], values, rtol=1e-9, atol=1e-12)
         alone = np.array([jacobian for _, jacobian in each])
         assert (np.abs(alone - jacobians) <= 1e-7 * size).all()
+
+
+def test_at_the_rim_of_a_facet_the_inside_is_returned_and_told():
+    # Two points pulled across their line turn about either: any motion between will do.
+    surface = PointContacts([[0.1, 0.0], [-0.1, 0.0]], [3.0, 3.0], Scaling(0.1, 6.0))
+    across, along = [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]
+    assert not surface.is_smooth_at(across)
+    assert not surface.twist_jacobian(across)[1].any()
+    assert surface.is_smooth_at(along)
+    x, y = TRIANGLE.points[0]
+    rest = TRIANGLE.wrench_of_twist([y, -x, 1.0])
+    limit = TRIANGLE.friction_limits[0]
+    for part, smooth in ((0.9, True), (1.0, False), (1.1, True)):
+        fx, fy = part * limit * np.array([0.6, -0.8])
+        load = rest + [fx, fy, x * fy - y * fx]
+        assert TRIANGLE.is_smooth_at(load) == smooth
+        assert TRIANGLE.twist_jacobian(load)[1].any() == (part > 1.0)
+    # And of the cone of motions for which a load stays at its corner.
+    norms = PowerSum([ONES, np.diag([1.0, 1.0, 0.0])], [0.5, 0.5])
+    assert norms.wrench_is_smooth_at([0.5, 0.0, 1.0])
+    assert not norms.wrench_is_smooth_at([1.0, 0.0, 1.0])
