@@ -230,7 +230,7 @@ def test_at_the_rim_of_a_facet_the_inside_is_returned_and_told():
     limit = TRIANGLE.friction_limits[0]
     for part, smooth in ((0.9, True), (1.0, False), (1.1, True)):
         fx, fy = part * limit * np.array([0.6, -0.8])
-        load = rest + [fx, fy, x * fy - y * fx]
+        load = np.add(rest, [fx, fy, x * fy - y * fx])
         assert TRIANGLE.is_smooth_at(load) == smooth
         assert TRIANGLE.twist_jacobian(load)[1].any() == (part > 1.0)
     # And of the cone of motions for which a load stays at its corner.
