@@ -16,12 +16,12 @@ from __future__ import annotations
 from abc import abstractmethod
 from dataclasses import dataclass, fields
 from functools import cache, cached_property
-from math import inf
+from math import inf, sqrt
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
-from limit_surface_ros.checks import as_positive, as_rows
+from limit_surface_ros.checks import as_positive, as_rows, one_direction
 from limit_surface_ros.surface.derivatives import Derivatives
 from limit_surface_ros.surface.scaling import Scaling, write_rows
 
@@ -31,9 +31,13 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.surface.gauges.gauge import Vector
     from limit_surface_ros.surface.shape import Shape
 
 Self = TypeVar("Self", bound="LimitSurface")
+
+# Sizes of a scaled vector between which its fourth powers are numbers, for the scalar maps.
+_SMALLEST, _LARGEST = 1e-70, 1e70
 
 
 @dataclass(frozen=True)
@@ -314,3 +318,35 @@ class LimitSurface(Derivatives):
         known = factors < inf
         scale = np.divide(factors, power, out=np.zeros_like(power), where=known)
         return np.asarray(twists * scale[..., np.newaxis])
+
+    def _one_load(self, wrench: Any) -> Vector | None:
+        """Return a single, plainly valid wrench in scaled variables, None for anything else."""
+        one = one_direction(wrench)
+        if one is None:
+            return None
+        force = self.scaling.friction_force
+        x, y = one[0] / force, one[1] / force
+        z = one[2] / (force * self.scaling.characteristic_length)
+        return (x, y, z) if _SMALLEST < abs(x) + abs(y) + abs(z) < _LARGEST else None
+
+    def _one_motion(self, twist: Any) -> Vector | None:
+        """Return a single, plainly valid twist in scaled variables, None for anything else."""
+        one = one_direction(twist)
+        if one is None:
+            return None
+        x, y, z = one[0], one[1], one[2] * self.scaling.characteristic_length
+        return (x, y, z) if _SMALLEST < abs(x) + abs(y) + abs(z) < _LARGEST else None
+
+    def _wrench_of(self, load: Vector) -> Floats:
+        """Return the wrench of a scaled load."""
+        force = self.scaling.friction_force
+        torque = force * self.scaling.characteristic_length * load[2]
+        return np.array((force * load[0], force * load[1], torque))
+
+    def _twist_along(self, motion: Vector) -> Floats:
+        """Return the twist of unit norm along a scaled motion."""
+        x, y, z = motion
+        length = sqrt(x * x + y * y + z * z)
+        return np.array(
+            (x / length, y / length, z / (length * self.scaling.characteristic_length))
+        )

@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING
+from abc import abstractmethod
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Bools, Floats
+    from limit_surface_ros.surface.gauges.gauge import Vector
 
 # How far beside a vector its map is looked at for a rim, and by how much it then moves.
 _BESIDE, _MOVED = 1e-7, 1e-10
@@ -162,6 +164,22 @@ class Derivatives(InScaledVariables):
             still = ~matrices.any(axis=0)
             smooth[block] = whole & ~_at_rims(self.shape.loads, columns, still & whole)
         return smooth.reshape(array.shape[:-1])
+
+    @abstractmethod
+    def _one_load(self, wrench: Any) -> Vector | None:
+        """Return a single, plainly valid wrench in scaled variables, None for anything else."""
+
+    @abstractmethod
+    def _one_motion(self, twist: Any) -> Vector | None:
+        """Return a single, plainly valid twist in scaled variables, None for anything else."""
+
+    @abstractmethod
+    def _twist_along(self, motion: Vector) -> Floats:
+        """Return the twist of unit norm along a scaled motion."""
+
+    @abstractmethod
+    def _wrench_of(self, load: Vector) -> Floats:
+        """Return the wrench of a scaled load."""
 
 
 def _at_rims(kernel: Callable[[Floats], Floats], columns: Floats, still: Bools) -> Bools:

@@ -10,8 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from math import sqrt
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,7 +19,6 @@ from limit_surface_ros.checks import (
     as_positive,
     as_rows,
     as_vectors,
-    one_direction,
 )
 from limit_surface_ros.runtime import keep_scratch
 
@@ -30,11 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from limit_surface_ros.checks import Floats
-    from limit_surface_ros.surface.gauges.gauge import Vector
     from limit_surface_ros.surface.shape import Shape
-
-# Sizes of a scaled vector between which its fourth powers are numbers, for the scalar maps.
-_SMALLEST, _LARGEST = 1e-70, 1e70
 
 
 @dataclass(frozen=True)
@@ -94,38 +88,6 @@ class InScaledVariables(ABC):
     @abstractmethod
     def shape(self) -> Shape:
         """The surface in scaled variables."""
-
-    def _one_load(self, wrench: Any) -> Vector | None:
-        """Return a single, plainly valid wrench in scaled variables, None for anything else."""
-        one = one_direction(wrench)
-        if one is None:
-            return None
-        force = self.scaling.friction_force
-        x, y = one[0] / force, one[1] / force
-        z = one[2] / (force * self.scaling.characteristic_length)
-        return (x, y, z) if _SMALLEST < abs(x) + abs(y) + abs(z) < _LARGEST else None
-
-    def _one_motion(self, twist: Any) -> Vector | None:
-        """Return a single, plainly valid twist in scaled variables, None for anything else."""
-        one = one_direction(twist)
-        if one is None:
-            return None
-        x, y, z = one[0], one[1], one[2] * self.scaling.characteristic_length
-        return (x, y, z) if _SMALLEST < abs(x) + abs(y) + abs(z) < _LARGEST else None
-
-    def _wrench_of(self, load: Vector) -> Floats:
-        """Return the wrench of a scaled load."""
-        force = self.scaling.friction_force
-        torque = force * self.scaling.characteristic_length * load[2]
-        return np.array((force * load[0], force * load[1], torque))
-
-    def _twist_along(self, motion: Vector) -> Floats:
-        """Return the twist of unit norm along a scaled motion."""
-        x, y, z = motion
-        length = sqrt(x * x + y * y + z * z)
-        return np.array(
-            (x / length, y / length, z / (length * self.scaling.characteristic_length))
-        )
 
     def _mapped(
         self,
