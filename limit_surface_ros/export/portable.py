@@ -204,12 +204,12 @@ def _corners(roots: Floats) -> tuple[Corner, ...]:
         norms = np.linalg.norm(images, axis=1)
         if rest > _NEARLY_FLAT * size or (norms <= 1e-9 * np.delete(sizes, index)).any():
             continue
-        pulls = np.einsum("kij,ki->kj", others, images) / norms[:, np.newaxis]
+        parts = np.einsum("kij,ki->kj", others, images) / norms[:, np.newaxis]
         forms = np.swapaxes(others, 1, 2) @ others
-        hessian = ((forms - pulls[:, :, np.newaxis] * pulls[:, np.newaxis]).T / norms).sum(axis=-1)
+        hessian = ((forms - parts[:, :, np.newaxis] * parts[:, np.newaxis]).T / norms).sum(axis=-1)
         if len(others) == 0:
             continue
-        gradient = pulls.sum(axis=0)
+        gradient = parts.sum(axis=0)
         each = Corners.of_norms(
             kink[np.newaxis],
             root[np.newaxis, :2],

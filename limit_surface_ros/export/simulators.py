@@ -157,8 +157,8 @@ def match_single_contact(surface: LimitSurface) -> SingleContact:
     limits = np.array([force, force, moment])
 
     def ellipsoid(twists: Floats) -> Floats:
-        pulls = twists * limits**2
-        return np.asarray(pulls / np.linalg.norm(twists * limits, axis=1)[:, np.newaxis])
+        images = twists * limits**2
+        return np.asarray(images / np.linalg.norm(twists * limits, axis=1)[:, np.newaxis])
 
     def prism(twists: Floats) -> Floats:
         speed = np.linalg.norm(twists[:, :2], axis=1)[:, np.newaxis]
@@ -228,6 +228,6 @@ def _sphere_forms(parameters: Floats) -> Floats:
 
 def _loads(forms: Floats, motions: Floats) -> Floats:
     """Return the loads (m, 3) of a sum of norms at scaled motions (m, 3)."""
-    pulls = np.einsum("kij,mj->kmi", forms, motions)
-    norms = np.sqrt(np.einsum("kmi,mi->km", pulls, motions))
-    return np.asarray((pulls / norms[:, :, np.newaxis]).sum(axis=0))
+    images = np.einsum("kij,mj->kmi", forms, motions)
+    norms = np.sqrt(np.einsum("kmi,mi->km", images, motions))
+    return np.asarray((images / norms[:, :, np.newaxis]).sum(axis=0))

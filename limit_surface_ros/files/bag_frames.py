@@ -159,7 +159,7 @@ class FrameTree:
         return sorted({*self._parents, *self._parents.values()})
 
     @property
-    def told(self) -> str:
+    def in_words(self) -> str:
         """The names of all frames for an error, cut where they are too many."""
         return ", ".join(self.frames)[:_LONGEST_LIST] or "none"
 
@@ -198,7 +198,7 @@ class FrameTree:
         if meeting is None:
             raise FrameError(
                 f"no transform from frame {source!r:.60} to {target!r:.60} is in the bag's /tf or "
-                f"/tf_static; frames there: {self.told}"
+                f"/tf_static; frames there: {self.in_words}"
             )
         return up[: up.index(meeting)] + down[: down.index(meeting)]
 

@@ -162,12 +162,12 @@ def read_samples(
 
 def counts_in_words(frames: Counter[tuple[str, str]]) -> str:
     """Return frames with how many messages are in each, the most frequent first."""
-    told = []
+    parts = []
     for (frame, child), count in frames.most_common(_MOST_FRAMES):
         of = f" of {child[:40]!r}" if child else ""
-        told.append(f"{frame[:40]!r}{of} ({count})")
-    more = len(frames) - len(told)
-    return ", ".join(told) + (f" and {more} more" if more > 0 else "")
+        parts.append(f"{frame[:40]!r}{of} ({count})")
+    more = len(frames) - len(parts)
+    return ", ".join(parts) + (f" and {more} more" if more > 0 else "")
 
 
 def planar_poses(samples: Samples, path: Any) -> Floats:

@@ -55,9 +55,9 @@ class Bag:
         name = topic if topic in self.types and name not in self.types else name
         if name not in self.types:
             fit = [key for key, kind in self.types.items() if kind in accepted]
-            told = f"; of {what} there are {_listed(fit)}" if accepted else ""
+            hint = f"; of {what} there are {_listed(fit)}" if accepted else ""
             raise FileError(
-                f"{self.path}: has no topic {name:.200}; there are {_listed(self.types)}{told}"
+                f"{self.path}: has no topic {name:.200}; there are {_listed(self.types)}{hint}"
             )
         kind = self.types[name]
         if accepted and kind not in accepted:

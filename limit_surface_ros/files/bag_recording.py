@@ -202,7 +202,7 @@ class _Reading:
         if body is None or frame is None:
             raise FileError(
                 f"{self._path}: {topic} holds transforms: say of which frame with --body, and in "
-                f"which with --fixed; frames there: {tree.told}"
+                f"which with --fixed; frames there: {tree.in_words}"
             )
         try:
             times = tree.times_of(frame, body)
@@ -298,14 +298,14 @@ class _Reading:
             placed = moving(pose_times, poses, at, self._max_gap)
             return placed.inverse @ tree.look_up(frame, sensor, at, self._max_gap)
 
-        seen = transforms(times)
-        self._note_transforms(sensor, seen)
-        wrenches.keep(seen.known)
-        return lambda at, values: transforms(at).wrenches(values), times[seen.known]
+        found = transforms(times)
+        self._note_transforms(sensor, found)
+        wrenches.keep(found.known)
+        return lambda at, values: transforms(at).wrenches(values), times[found.known]
 
-    def _note_transforms(self, sensor: str, seen: MovingTransform) -> None:
-        unknown = int(np.count_nonzero(~seen.known))
-        if unknown == len(seen.known):
+    def _note_transforms(self, sensor: str, found: MovingTransform) -> None:
+        unknown = int(np.count_nonzero(~found.known))
+        if unknown == len(found.known):
             raise DataError(
                 f"{self._path}: no wrench in frame {sensor!r} has a transform near it in time"
             )
@@ -315,16 +315,16 @@ class _Reading:
         )
         if unknown:
             self.notes.append(f"{unknown} wrenches have no transform near them: left out")
-        if seen.tilt > _ALONG:
+        if found.tilt > _ALONG:
             self.notes.append(
-                f"frame {sensor!r} is tilted by up to {np.degrees(seen.tilt):.0f} deg against the "
-                "body's plane: the weight of a tool behind the sensor is not known and not taken "
-                "away"
+                f"frame {sensor!r} is tilted by up to {np.degrees(found.tilt):.0f} deg against "
+                "the body's plane: the weight of a tool behind the sensor is not known and not "
+                "taken away"
             )
 
     def _ways(self, sensor: str) -> str:
         """Return what helps where wrenches are in a foreign frame, to end a message."""
-        frames = self._frames().told
+        frames = self._frames().in_words
         return (
             f"; frames in /tf: {frames}. Say --body {sensor} if that is the body's frame, or give "
             "its pose in the body's with --wrench-transform 'x y z roll pitch yaw'"

@@ -133,13 +133,13 @@ class CsvTable:
         return value
 
     def _wrong_length(self, cells: Sequence[str]) -> str:
-        told = f"has {counted(len(cells), 'cell')}, the columns are {self.width}"
+        message = f"has {counted(len(cells), 'cell')}, the columns are {self.width}"
         if self.form.delimiter == "," and len(cells) == 2 * self.width:
             return (
-                f"{told}; decimal commas cannot be told from commas between cells: separate "
+                f"{message}; decimal commas cannot be told from commas between cells: separate "
                 "cells by semicolons"
             )
-        return f"{told}; cells are read as separated {self.form.in_words}"
+        return f"{message}; cells are read as separated {self.form.in_words}"
 
     def keep(self, kept: Sequence[int], why: str) -> None:
         """Leave out all rows but some, and note how many and why.
@@ -242,9 +242,9 @@ def _names_above_data(
     if above >= 0 and first == 1 and len(cut[above][1]) > 1:
         # Whatever stands over the rows, alone, was meant to name them.
         return cut[above]
-    told = [line for line in comments if line[0] < cut[first][0]]
-    if told and len(told[-1][1]) == widths[first]:
-        return told[-1]
+    stated = [line for line in comments if line[0] < cut[first][0]]
+    if stated and len(stated[-1][1]) == widths[first]:
+        return stated[-1]
     return None
 
 

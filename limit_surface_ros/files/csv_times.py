@@ -45,13 +45,13 @@ class TimeColumns:
     Attributes:
         columns: One, or that of seconds and that of nanoseconds.
         seconds: How long the unit of the first is [s].
-        told: What the times are, for people to read.
+        in_words: What the times are, for people to read.
         stated: Whether the file or the user states the unit.
     """
 
     columns: tuple[int, ...]
     seconds: Decimal
-    told: str
+    in_words: str
     stated: bool
 
 
@@ -92,8 +92,8 @@ def find_times(table: CsvTable, wanted: int | None, unit: str | None = None) -> 
     if unit is None and stated is None and _NANOSECONDS.search(bare) is not None:
         stated = "ns"
     chosen = unit or units.plain(stated or "s")
-    told = f"{table.title(column)} in {chosen}"
-    return TimeColumns((column,), Decimal(repr(units.TIME[chosen])), told, bool(unit or stated))
+    words = f"{table.title(column)} in {chosen}"
+    return TimeColumns((column,), Decimal(repr(units.TIME[chosen])), words, bool(unit or stated))
 
 
 def _stamp_of_two(table: CsvTable, column: int) -> tuple[int, int] | None:
@@ -217,7 +217,7 @@ def _check_span(table: CsvTable, found: TimeColumns, times: Floats, first: float
         )
     if len(times) < 2 or SHORTEST <= span <= LONGEST:
         return
-    as_read = "" if not found.stated else f" as {found.told}"
+    as_read = "" if not found.stated else f" as {found.in_words}"
     likely = _likely_unit(span / float(found.seconds), span > LONGEST)
     raise FileError(
         f"{table.path}: the times span {_in_words(span)}{as_read}: are they in {likely}? "

@@ -234,8 +234,8 @@ def _row(table: CsvTable, row: int, columns: Sequence[int]) -> list[float] | Non
             continue
         if table.drop_bad:
             return None
-        told = f"is below {SMALLEST:g} in size, too small for a direction"
+        message = f"is below {SMALLEST:g} in size, too small for a direction"
         if not any(part):
-            told = "is zero: it has no direction; --drop-bad leaves such rows out"
-        raise FileError(f"{table.path}: line {table.lines[row]}: the {what} {told}")
+            message = "is zero: it has no direction; --drop-bad leaves such rows out"
+        raise FileError(f"{table.path}: line {table.lines[row]}: the {what} {message}")
     return values

@@ -92,8 +92,8 @@ def read_response(
         raise FileError(f"{path}: holds {counted(len(values), 'sample')}; at least 2 are needed")
     if value_column is None:
         _refuse_constant(table, value, values)
-    told = units.unit_of_cell(table.unit(value))
-    table.notes.append(f"values are {table.title(value)}" + (f" in {told}" if told else ""))
+    unit = units.unit_of_cell(table.unit(value))
+    table.notes.append(f"values are {table.title(value)}" + (f" in {unit}" if unit else ""))
     try:
         return RecordedResponse(Record(times - times[0], values), tuple(table.notes))
     except (DataError, RangeError) as error:
@@ -121,7 +121,7 @@ def _times_and_value(
         held = [row for row in range(len(table.rows)) if table.number(row, value) is not None]
         table.keep(held, f"{table.title(value)} holds no number")
     times = read_times(table, found)
-    table.notes.append(f"times are {found.told}")
+    table.notes.append(f"times are {found.in_words}")
     return times, value
 
 

@@ -238,8 +238,8 @@ class Section:
             number = float(text)
         except ValueError:
             hint = next((hint for form, hint in _NOT_QUITE if form.fullmatch(text)), "")
-            told = f"must be a number, got {_shown(text)}" + (f"; {hint}" if hint else "")
-            raise self.error(key, told) from None
+            message = f"must be a number, got {_shown(text)}" + (f"; {hint}" if hint else "")
+            raise self.error(key, message) from None
         raise self.error(key, f"{_shown(text)} is text; write it as the number {number!r}")
 
 

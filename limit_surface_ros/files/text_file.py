@@ -46,9 +46,9 @@ def read_lines(path: Path, what: str = "a CSV file") -> list[str]:
         FileError: The file is absent, no regular file, too large, or holds no text.
     """
     content = read_bytes(path, LARGEST_TEXT, what)
-    for start, told in _KNOWN_BINARIES:
+    for start, kind in _KNOWN_BINARIES:
         if content.startswith(start):
-            raise FileError(f"{path}: is {told}")
+            raise FileError(f"{path}: is {kind}")
     text = _decoded(content)
     if text is None or "\x00" in text:
         raise FileError(f"{path}: holds bytes that are no text; {what} is accepted")

@@ -146,8 +146,8 @@ class SmoothCurve(Outline):
         self._samples = Polygon(self._curve(self._places))
         self._reach = float(np.diff(np.append(self._places, self._end)).max())
         first, second = self._curve(self._places, 1), self._curve(self._places, 2)
-        bent = cross(first, second)
-        self._is_convex = bool((bent >= -1e-9 * np.abs(bent).max()).all())
+        turning = cross(first, second)
+        self._is_convex = bool((turning >= -1e-9 * np.abs(turning).max()).all())
 
     @property
     def is_convex(self) -> bool:
@@ -210,9 +210,9 @@ class SmoothCurve(Outline):
             first, second = self._curve(at, 1), self._curve(at, 2)
             slope = (arm * first).sum(axis=1)
             speed = (first * first).sum(axis=1)
-            bend = speed + (arm * second).sum(axis=1)
+            curvature = speed + (arm * second).sum(axis=1)
             # Where the distance is not convex, Gauss and Newton's step leads down all the same.
-            step = slope / np.where(bend > 0.1 * speed, bend, speed)
+            step = slope / np.where(curvature > 0.1 * speed, curvature, speed)
             moved = np.clip(place - step, start - self._reach, start + self._reach)
             done = not (np.abs(moved - place) > 1e-14 * self._end).any()
             place = moved

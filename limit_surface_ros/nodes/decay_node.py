@@ -175,25 +175,25 @@ class DecayNode(ModelNode[DecayModel]):
 
     def describe(self) -> dict[str, str]:
         """Return what diagnostics say beside counts and times."""
-        told = super().describe() | {"surface": self.surfaces.models.default}
+        lines = super().describe() | {"surface": self.surfaces.models.default}
         onset = self.onset
         if onset is None:
-            return told | {"onset": "none yet"}
+            return lines | {"onset": "none yet"}
         response = onset.response
-        told |= {
+        lines |= {
             "onset": f"{'running' if self._stream.running else 'over'}, model {onset.model.name}",
             "measurements": str(response.samples),
             "outliers": str(response.outliers),
         }
         if response.samples:
             verdict = response.verdict
-            told["verdict"] = verdict.reason or (
+            lines["verdict"] = verdict.reason or (
                 f"{verdict.family}: amplitude {verdict.amplitude:.3g}, rate {verdict.rate:.3g}, "
                 f"delay {verdict.delay:.3g} s" + ", sign reversed" * verdict.reversed
             )
-            told["residual"] = f"{response.residual:.3g} of the onset"
-            told["off_axis"] = f"{onset.off_axis:.3g} of the onset"
-        return told
+            lines["residual"] = f"{response.residual:.3g} of the onset"
+            lines["off_axis"] = f"{onset.off_axis:.3g} of the onset"
+        return lines
 
     def _begin(self, message: WrenchStamped) -> None:
         options = EstimationOptions(

@@ -20,8 +20,8 @@ def main() -> int:
     """Run both nodes until SIGINT or SIGTERM; return the exit code."""
     modules = limit_surface_node, decay_node
     tables = {module.NAME: [*module.SETTINGS, *COMMON_SETTINGS] for module in modules}
-    told = "\n".join([__doc__, *(module.HELP for module in modules)])
-    return spin.run(lambda: [LimitSurfaceNode(), DecayNode()], tables, told, sys.argv)
+    text = "\n".join([__doc__, *(module.HELP for module in modules)])
+    return spin.run(lambda: [LimitSurfaceNode(), DecayNode()], tables, text, sys.argv)
 
 
 if __name__ == "__main__":

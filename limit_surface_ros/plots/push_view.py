@@ -187,10 +187,10 @@ def write_film(
         lengths = np.linspace(0.0, run.path_lengths[-1], count)
         poses = run.poses_at(lengths)
         corners = outline.drawn()
-        seen = 1e3 * np.concatenate([outline_at(corners, pose) for pose in poses])
-        room = 1e3 * tip_radius + 5.0
-        low = np.minimum(seen.min(axis=0), 1e3 * run.tips.min(axis=0)) - room
-        high = np.maximum(seen.max(axis=0), 1e3 * run.tips.max(axis=0)) + room
+        drawn = 1e3 * np.concatenate([outline_at(corners, pose) for pose in poses])
+        margin = 1e3 * tip_radius + 5.0
+        low = np.minimum(drawn.min(axis=0), 1e3 * run.tips.min(axis=0)) - margin
+        high = np.maximum(drawn.max(axis=0), 1e3 * run.tips.max(axis=0)) + margin
         axes = figure.add_subplot()
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         axes.set(xlabel="x [mm]", ylabel="y [mm]")

@@ -139,10 +139,12 @@ def write_slide_film(
     poses, _ = found.path.at(times)
     with new_figure(5.0, 4.5) as figure:
         axes = figure.add_subplot()
-        seen = 1e3 * np.concatenate([outline_at(outline, pose) for pose in poses])
-        low, high = seen.min(axis=0), seen.max(axis=0)
-        room = 0.05 * (high - low).max()
-        axes.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room))
+        drawn = 1e3 * np.concatenate([outline_at(outline, pose) for pose in poses])
+        low, high = drawn.min(axis=0), drawn.max(axis=0)
+        margin = 0.05 * (high - low).max()
+        axes.set(
+            xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin)
+        )
         axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
         axes.plot(*(1e3 * outline_at(outline, poses[0])).T, color=SKY, linewidth=0.8)
         axes.plot(*(1e3 * poses[:, :2]).T, color=VERMILION, linewidth=0.8)

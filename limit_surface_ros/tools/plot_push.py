@@ -18,11 +18,11 @@ from limit_surface_ros.files.yaml_reader import read_yaml
 from limit_surface_ros.motion.rollout import DEFAULT_ACCURACY, OVERLAPS, simulate_push
 from limit_surface_ros.motion.spread import push_spread
 from limit_surface_ros.plots.canvas import save_figure
-from limit_surface_ros.plots.film import FILMS
 from limit_surface_ros.plots.push_view import draw_push, write_film
 from limit_surface_ros.tools.common.options import (
+    add_motion_options,
     add_picture_options,
-    check_output,
+    check_film,
     check_picture,
     check_ranges,
 )
@@ -74,14 +74,6 @@ def parser() -> argparse.ArgumentParser:
         help="corners x y of the path of the tip's centre, two or more [m]",
     )
     top.add_argument(
-        "--pose",
-        type=float,
-        nargs=3,
-        default=[0.0, 0.0, 0.0],
-        metavar=("X", "Y", "ANGLE"),
-        help="where the body begins [m, m, rad] (0 0 0)",
-    )
-    top.add_argument(
         "--tip-radius", type=float, default=0.005, help="of the pusher [m] (%(default)g)"
     )
     top.add_argument(
@@ -110,12 +102,7 @@ def parser() -> argparse.ArgumentParser:
         help="push N surfaces, too, that the scatter of a model of `fit_surface --auto` allows, "
         "and draw the ellipse of 9 of 10 ends",
     )
-    top.add_argument(
-        "--animate", type=Path, metavar="FILM", help=f"film to write too: {', '.join(FILMS)}"
-    )
-    top.add_argument(
-        "--seconds", type=float, default=4.0, help="length of the film [s] (%(default)g)"
-    )
+    add_motion_options(top, "the body")
     return top
 
 
@@ -155,9 +142,8 @@ def default_path(outline: Outline, pose: Floats, radius: float) -> Floats:
 def run(options: argparse.Namespace) -> None:
     """Read, simulate, say, draw."""
     check_picture(options, [options.model])
-    check_ranges(options, {"seconds": (0.1, 120.0), "members": (0, _MOST_MEMBERS)})
-    if options.animate is not None:
-        check_output(options.animate, FILMS, [options.model])
+    check_film(parser(), options, [options.model])
+    check_ranges(options, {"members": (0, _MOST_MEMBERS)})
     if options.path is not None and (len(options.path) < 4 or len(options.path) % 2):
         raise RangeError("--path takes two or more corners, each an x and a y")
     body = read_body(options.model)

@@ -20,13 +20,12 @@ from limit_surface_ros.motion.sliding.load import Load
 from limit_surface_ros.motion.sliding.slide import slide_stages, stop_bracket
 from limit_surface_ros.motion.stages import finish
 from limit_surface_ros.plots.canvas import save_figure
-from limit_surface_ros.plots.film import FILMS
 from limit_surface_ros.plots.slide_view import draw_slide, write_slide_film
 from limit_surface_ros.tools.common.options import (
+    add_motion_options,
     add_picture_options,
-    check_output,
+    check_film,
     check_picture,
-    check_ranges,
     refuse_unused,
 )
 from limit_surface_ros.tools.common.program import program_parser, run_program
@@ -95,20 +94,7 @@ def parser() -> argparse.ArgumentParser:
         action="store_true",
         help="the load keeps its direction in the world; else it turns with the body",
     )
-    top.add_argument(
-        "--pose",
-        type=float,
-        nargs=3,
-        default=[0.0, 0.0, 0.0],
-        metavar=("X", "Y", "ANGLE"),
-        help="where the reference point begins [m, m, rad] (0 0 0)",
-    )
-    top.add_argument(
-        "--animate", type=Path, metavar="FILM", help=f"film to write too: {', '.join(FILMS)}"
-    )
-    top.add_argument(
-        "--seconds", type=float, default=4.0, help="length of the film [s] (%(default)g)"
-    )
+    add_motion_options(top, "the reference point")
     return top
 
 
@@ -126,11 +112,7 @@ def run(options: argparse.Namespace) -> None:
     """Read, slide, say, draw."""
     inputs = [path for path in (options.model, options.decay) if path is not None]
     check_picture(options, inputs)
-    check_ranges(options, {"seconds": (0.1, 120.0)})
-    if options.animate is not None:
-        check_output(options.animate, FILMS, inputs)
-    else:
-        refuse_unused(parser(), options, ["seconds"], "for --animate")
+    check_film(parser(), options, inputs)
     if (options.wrench is None) != (options.decay is None):
         raise RangeError("--wrench and --decay belong together: a load and how it dies away")
     model = read_surface_model(options.model)

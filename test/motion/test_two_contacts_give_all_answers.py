@@ -8,6 +8,7 @@ import pytest
 
 from limit_surface_ros.errors import RangeError, ShapeError, ZeroVectorError
 from limit_surface_ros.motion.outcomes import ContactMode
+from limit_surface_ros.motion.push import push
 from limit_surface_ros.motion.several_contacts import stable_turns, two_point_push
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
@@ -174,3 +175,20 @@ def test_a_pusher_that_leaves_moves_nothing():
 def test_what_is_no_push_of_two_points_is_refused(arguments, error):
     with pytest.raises(error):
         two_point_push(PowerSum.thesis([np.eye(3)], SCALING), *arguments)
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.02])
+def test_two_contacts_on_one_line_push_as_one_does(apart):
+    # Their normals give one wrench: no motion slides along both and is told from any other.
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        matrix, points, normals, _, twist = random_case(rng, on_an_edge=False)
+        surface = PowerSum.thesis([matrix], SCALING)
+        (x, y), normal = points[0], normals[0]
+        velocity = [twist[0] - twist[2] * y, twist[1] + twist[2] * x]
+        with np.errstate(all="raise"):
+            places, inward = [points[0], points[0] + apart * normal], [normal, normal]
+            answers = two_point_push(surface, places, inward, 0.0, twist)
+        one = push(surface, points[0], normal, 0.0, velocity).twist
+        for answer in answers:
+            np.testing.assert_allclose(answer.twist, one, rtol=1e-9, atol=1e-12)

@@ -62,10 +62,10 @@ class Path:
         a0, a1 = self.accelerations[left] * width**2, self.accelerations[right] * width**2
         rise = end - begin - v0 - 0.5 * a0
         speed = v1 - v0 - a0
-        bend = a1 - a0
-        c3 = 10.0 * rise - 4.0 * speed + 0.5 * bend
-        c4 = -15.0 * rise + 7.0 * speed - bend
-        c5 = 6.0 * rise - 3.0 * speed + 0.5 * bend
+        jump = a1 - a0
+        c3 = 10.0 * rise - 4.0 * speed + 0.5 * jump
+        c4 = -15.0 * rise + 7.0 * speed - jump
+        c5 = 6.0 * rise - 3.0 * speed + 0.5 * jump
         poses = begin + part * (v0 + part * (0.5 * a0 + part * (c3 + part * (c4 + part * c5))))
         slopes = v0 + part * (a0 + part * (3.0 * c3 + part * (4.0 * c4 + part * 5.0 * c5)))
         slopes = slopes / safe[:, np.newaxis]

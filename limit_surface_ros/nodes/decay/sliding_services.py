@@ -54,7 +54,7 @@ SETTINGS = (
     Setting(
         "grip_margin",
         1.0,
-        "By which wrenches of ~/held_wrench are multiplied before the normal force is told",
+        "By which wrenches of ~/held_wrench are multiplied before the normal force is worked out",
         minimum=1e-3,
         maximum=1e3,
     ),
@@ -70,7 +70,7 @@ SETTINGS = (
 # Time within which a body must rest if none is asked for [s].
 LONGEST = 3600.0
 MOST_POINTS = 100_000
-# Largest cosine of a tilt: the body slides in the plane of the frame that its path is told in.
+# Largest cosine of a tilt: the body slides in the plane of the frame of its path.
 _LEVEL = 1e-3
 
 
@@ -98,11 +98,11 @@ async def _inertia_of(node: Any, model: SurfaceModel, stamped: InertiaStamped) -
         RangeError: Mass or moment is not above 0.
         FrameError: No transform to the model's frame is known.
     """
-    told = stamped.inertia
+    given = stamped.inertia
     names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    tensor = [convert.checked_number(f"inertia.{name}", getattr(told, name)) for name in names]
-    mass = convert.checked_number("inertia.m", told.m)
-    centre = convert.vector_components("inertia.com", told.com)
+    tensor = [convert.checked_number(f"inertia.{name}", getattr(given, name)) for name in names]
+    mass = convert.checked_number("inertia.m", given.m)
+    centre = convert.vector_components("inertia.com", given.com)
     transform = await node.input.transform(model, stamped.header)
     xx, xy, xz, yy, yz, zz = tensor
     full = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
@@ -308,8 +308,8 @@ async def _required(
     normal_force = _normal_force_of(model, surface)
     if normal_force is None:
         raise RangeError(
-            f"model {model.name!r} states no normal_force, so that no force can be told: state it "
-            "in the model's file"
+            f"model {model.name!r} states no normal_force, so that no force can be given: "
+            "state it in the model's file"
         )
     found = required_share(surface, wrench, exponent, margin)
     message = NormalForce(

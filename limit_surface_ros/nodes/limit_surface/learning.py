@@ -126,19 +126,19 @@ class Learner:
 
     def describe(self) -> dict[str, str]:
         """Return what diagnostics say of it."""
-        told = {"learning": f"{self.name}, {self.count} pushes, {self._refused} refused"}
+        lines = {"learning": f"{self.name}, {self.count} pushes, {self._refused} refused"}
         if self._stopped:
-            told["learning"] += f"; stopped: {self._stopped}"
+            lines["learning"] += f"; stopped: {self._stopped}"
         if self._last:
             before, prior = (
                 np.degrees([getattr(update, name) for update in self._last])
                 for name in ("angle_before", "prior_angle")
             )
             sentence = "predicted within {:.1f} deg, by the prior {:.1f} deg"
-            told["last push"] = sentence.format(before[-1], prior[-1])
+            lines["last push"] = sentence.format(before[-1], prior[-1])
             mean = f"{sentence}, mean of {len(before)}"
-            told["last pushes"] = mean.format(float(before.mean()), float(prior.mean()))
-        return told
+            lines["last pushes"] = mean.format(float(before.mean()), float(prior.mean()))
+        return lines
 
     def close(self) -> None:
         """End the thread and its process after the push that they are at."""

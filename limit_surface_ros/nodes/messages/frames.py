@@ -176,20 +176,20 @@ class Frames:
 
     def _newest_in_place_of(self, target: str, source: str, stamp: int, reason: str) -> Time:
         """Return the newest time that is known if it will do, or raise what is wrong."""
-        told = f"no transform from frame {_shown(source)} to the model's frame {_shown(target)}"
+        missing = f"no transform from frame {_shown(source)} to the model's frame {_shown(target)}"
         try:
             latest = self._buffer.get_latest_common_time(target, source)
         except Exception as error:
             # Of tf2's exceptions the base class is all that they have in common.
             slash = next((frame for frame in (source, target) if frame.startswith("/")), None)
             hint = f"; frames of tf2 begin with no slash: {_shown(slash[1:])}?" if slash else ""
-            raise FrameError(f"{told} is known: {shortened(str(error), 500)}{hint}") from None
+            raise FrameError(f"{missing} is known: {shortened(str(error), 500)}{hint}") from None
         age = (stamp - latest.nanoseconds) * 1e-9
         if age <= 0.0:
-            raise TransformTooOldError(f"{told} at its stamp: {shortened(reason, 500)}")
+            raise TransformTooOldError(f"{missing} at its stamp: {shortened(reason, 500)}")
         if age > self._parameters["transform_tolerance"]:
             raise TransformTooNewError(
-                f"{told} at its stamp has come: the newest is {age:.3g} s older"
+                f"{missing} at its stamp has come: the newest is {age:.3g} s older"
             )
         return latest
 

@@ -77,8 +77,8 @@ class StaticTransforms:
         chain: dict[str, None] = {}
         while frame not in self._in_root and frame in self._edges:
             if frame in chain:
-                told = shortened(" < ".join(chain))
-                raise RangeError(f"frame {_shown(frame)} is its own ancestor: {told}")
+                cycle = shortened(" < ".join(chain))
+                raise RangeError(f"frame {_shown(frame)} is its own ancestor: {cycle}")
             chain[frame] = None
             frame = self._edges[frame][0]
         root, pose = self._in_root.setdefault(

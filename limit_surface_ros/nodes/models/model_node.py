@@ -38,7 +38,7 @@ class ModelNode(Node, Generic[Model]):
     Attributes:
         values: Its parameters.
         host: Its models.
-        health: What it has seen.
+        health: Counts what comes and what is refused.
         endpoints: Its services and topics.
 
     Args:

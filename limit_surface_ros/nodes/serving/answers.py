@@ -38,8 +38,8 @@ def sentence(error: Exception) -> str:
     """Return what a person should read."""
     if isinstance(error, LimitSurfaceError):
         return shortened(str(error), LONGEST_SENTENCE)
-    told = f"defect of limit_surface_ros, please report it: {type(error).__name__}: {error}"
-    return shortened(told, LONGEST_SENTENCE)
+    message = f"defect of limit_surface_ros, please report it: {type(error).__name__}: {error}"
+    return shortened(message, LONGEST_SENTENCE)
 
 
 class FiniteCheck:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A node's health: what it has seen since it started, told on /diagnostics."""
+"""A node's health: what it has counted since it started, on /diagnostics."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ class Diagnostics:
     Args:
         node: The node.
         parameters: Its parameters, which include `SETTINGS`.
-        health: What it has seen.
+        health: Its counts.
         peers: Those on its topics.
         describe: Further values, by key.
     """
@@ -222,16 +222,16 @@ class Diagnostics:
         health = self._health
         now = self._node.get_clock().now().nanoseconds
         stale = health.stale(now, self._parameters["input_timeout"])
-        told = []
+        messages = []
         if health.news:
-            told.append(health.news_in_words())
+            messages.append(health.news_in_words())
         if stale:
-            told.append(f"no input on {', '.join(stale)}")
+            messages.append(f"no input on {', '.join(stale)}")
         if self._mismatches:
-            told.append(self._mismatches[0].sentence)
+            messages.append(self._mismatches[0].sentence)
         if self._duplicates:
-            told.append(self._duplicate_message)
-        level = DiagnosticStatus.WARN if told else DiagnosticStatus.OK
+            messages.append(self._duplicate_message)
+        level = DiagnosticStatus.WARN if messages else DiagnosticStatus.OK
         if stale:
             level = DiagnosticStatus.STALE
         values = {**self._describe(), **_counts_and_times(health, now)}
@@ -240,7 +240,7 @@ class Diagnostics:
         return DiagnosticStatus(
             level=level,
             name=self._node.get_fully_qualified_name().lstrip("/"),
-            message="; ".join(told) or "serving",
+            message="; ".join(messages) or "serving",
             values=[KeyValue(key=key, value=value) for key, value in values.items()],
         )
 

@@ -138,8 +138,8 @@ class Endpoints:
 
     Args:
         node: The node.
-        health: What it has seen.
-        peers: Told of the topics.
+        health: Counts what comes and what is refused.
+        peers: Watches the topics.
     """
 
     def __init__(self, node: Node, health: Health, peers: Peers) -> None:

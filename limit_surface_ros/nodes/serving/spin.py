@@ -156,11 +156,11 @@ def _executor(nodes: Sequence[Any]) -> Executor:
     """
     asked = [str(node.get_parameter(EXECUTOR.name).value) for node in nodes]
     if len(set(asked)) > 1:
-        told = ", ".join(
+        given = ", ".join(
             f"{value} for {node.get_name()}" for node, value in zip(nodes, asked, strict=True)
         )
         raise RangeError(
-            f"{EXECUTOR.name} is {told}; the nodes of a process share one: give all of them the "
+            f"{EXECUTOR.name} is {given}; the nodes of a process share one: give all of them the "
             f"same, such as by -p {EXECUTOR.name}:=events"
         )
     if asked[0] == "events":

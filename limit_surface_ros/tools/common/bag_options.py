@@ -92,13 +92,13 @@ def add_bag_options(parser: argparse.ArgumentParser) -> None:
     )
     rules = parser.add_argument_group("bags: what counts as a quasi-static push")
     for rule, default in asdict(Selection()).items():
-        unit, _, told = _RULES[rule].partition("|")
+        unit, _, text = _RULES[rule].partition("|")
         rules.add_argument(
             f"--{rule.replace('_', '-')}",
             type=float,
             default=default,
             metavar="X",
-            help=f"{told} [{unit}] (%(default)s)",
+            help=f"{text} [{unit}] (%(default)s)",
         )
 
 

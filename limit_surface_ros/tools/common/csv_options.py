@@ -27,7 +27,7 @@ def add_cell_options(parser: argparse._ActionsContainer) -> None:
         "--delimiter",
         metavar="X",
         help=f"between cells of a CSV file: {', '.join(DELIMITERS)} or one character; "
-        "default: guessed, and told",
+        "default: guessed, and printed",
     )
     parser.add_argument(
         "--decimal", metavar="X", help="decimal mark of a CSV file, . or ,; default: guessed"

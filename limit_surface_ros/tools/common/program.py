@@ -57,8 +57,8 @@ def program_parser(
         files: What it reads, keys of `FILES`.
     """
     wrap = textwrap.TextWrapper(96, initial_indent="  ", subsequent_indent="      ")
-    told = "\n".join(wrap.fill(FILES[each]) for each in files)
-    page = f"\nfiles (all keys, columns and units: {FILES_PAGE}):\n{told}\n" if files else ""
+    described = "\n".join(wrap.fill(FILES[each]) for each in files)
+    page = f"\nfiles (all keys, columns and units: {FILES_PAGE}):\n{described}\n" if files else ""
     return argparse.ArgumentParser(
         prog=name,
         description=description,

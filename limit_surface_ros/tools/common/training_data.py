@@ -86,7 +86,7 @@ def checked(path: Path, data: TrainingData, anyway: bool) -> TrainingData:
     Args:
         path: Of the data, for the error.
         data: Recorded pushes.
-        anyway: Whether they are taken all the same; the doubts are then told.
+        anyway: Whether they are taken all the same; the doubts are then printed.
 
     Raises:
         DataError: They are not those of a body; the message names the likely cause.
