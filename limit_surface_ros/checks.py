@@ -53,6 +53,20 @@ def as_floats(name: str, values: ArrayLike) -> Floats:
     return array
 
 
+def as_coordinates(name: str, values: ArrayLike) -> Floats:
+    """Return `values` as `as_floats` does, and refuse what squares and products would overflow of.
+
+    Raises:
+        ShapeError: They are no numbers.
+        NotFiniteError: One is NaN or infinite.
+        RangeError: One is beyond `LARGEST` in size.
+    """
+    array = as_floats(name, values)
+    if array.size and float(np.abs(array).max()) > LARGEST:
+        raise RangeError(f"{name} must be at most {LARGEST:g} in size")
+    return array
+
+
 def as_vectors(name: str, values: ArrayLike) -> Floats:
     """Return `values` as a finite float64 array of shape (..., 3).
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from limit_surface_ros.checks import as_floats
+from limit_surface_ros.checks import as_coordinates
 from limit_surface_ros.errors import OutlineError, RangeError, ShapeError
 from limit_surface_ros.motion.push_checks import as_complex, as_vectors_of
 
@@ -252,7 +252,7 @@ class Polygon(Outline):
 
 
 def _vertices(values: ArrayLike) -> Floats:
-    points = as_floats("vertices", values)
+    points = as_coordinates("vertices", values)
     if points.ndim != 2 or points.shape[1] != 2:
         raise ShapeError(f"vertices must have shape (n, 2), got {points.shape}")
     if len(points) > MOST_VERTICES:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.checks import as_floats, as_positive
+from limit_surface_ros.checks import as_coordinates, as_positive
 from limit_surface_ros.errors import OutlineError, RangeError, ShapeError
 from limit_surface_ros.motion.inward_corner import Scene
 from limit_surface_ros.motion.outcomes import MODES, PushRun, PushRuns
@@ -155,14 +155,14 @@ class Pushing:
         reference_point: ArrayLike = (0.0, 0.0),
     ) -> None:
         """Check the settings."""
-        radius = float(as_floats("tip_radius", tip_radius))
+        radius = float(as_coordinates("tip_radius", tip_radius))
         if radius < 0.0:
             raise RangeError(f"tip_radius must be 0 or above, got {radius}")
         if not _FINEST <= as_positive("accuracy", accuracy) <= _COARSEST:
             raise RangeError(f"accuracy must be {_FINEST:g} to {_COARSEST:g} m, got {accuracy}")
         if overlap not in OVERLAPS:
             raise RangeError(f"overlap must be one of {', '.join(OVERLAPS)}, got {overlap!r}")
-        about = as_floats("reference_point", reference_point)
+        about = as_coordinates("reference_point", reference_point)
         if about.shape != (2,):
             raise ShapeError(f"reference_point must have shape (2,), got {about.shape}")
         self.scene = Scene(
@@ -176,7 +176,7 @@ class Pushing:
 
     def along(self, pose: ArrayLike, path: ArrayLike) -> Generator[None, None, PushRun]:
         """Do as `simulate_push`, in stages of about a millisecond."""
-        given, way = as_floats("pose", pose), as_floats("path", path)
+        given, way = as_coordinates("pose", pose), as_coordinates("path", path)
         if given.shape != (3,):
             raise ShapeError(f"pose must be x, y and an angle, got shape {given.shape}")
         if way.ndim != 2:
@@ -264,7 +264,7 @@ class Pushing:
 
 def _poses_and_paths(poses: ArrayLike, paths: ArrayLike) -> tuple[Floats, Floats]:
     """Return starts of bodies (n, 3) and paths of tips (n, m, ...), checked."""
-    given, ways = as_floats("poses", poses), as_floats("paths", paths)
+    given, ways = as_coordinates("poses", poses), as_coordinates("paths", paths)
     if given.ndim != 2 or given.shape[1] != 3:
         raise ShapeError(f"poses must have shape (n, 3), got {given.shape}")
     if ways.ndim != 3 or len(ways) != len(given):

@@ -321,7 +321,8 @@ SERVICES = (
         checked=("wrenches", "powers"),
     ),
     Service(Push, "push", push_at_a_point),
-    Service(ListModels, "list_models", LimitSurfaceNode.list_models),
+    # A normal force that no model file states is NaN there.
+    Service(ListModels, "list_models", LimitSurfaceNode.list_models, checked=("models",)),
     Service(DescribeModel, "describe_model", LimitSurfaceNode.describe_model),
 )
 

@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
 
-from geometry_msgs.msg import TwistStamped, WrenchStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
 from limit_surface_interfaces.msg import DecayForecast, ErrorCode
 from limit_surface_interfaces.srv import (
     EvaluateDecay,
@@ -23,6 +23,7 @@ from limit_surface_interfaces.srv import (
     WrenchesToTwists,
     WrenchToTwist,
 )
+from nav_msgs.msg import Path
 
 from decay_helpers import Bench
 from limit_surface_ros.errors import SolverError
@@ -161,3 +162,8 @@ def test_the_check_looks_at_every_number_and_every_array():
     huge = WrenchStamped()
     huge.wrench.force.x = huge.wrench.force.y = 1.7e308
     FiniteCheck(WrenchStamped)(huge)
+    path = Path(poses=[PoseStamped(), PoseStamped()])
+    FiniteCheck(Path)(path)
+    path.poses[1].pose.position.y = math.nan
+    with pytest.raises(SolverError, match=r"poses\[1\].*pose\.position\.y"):
+        FiniteCheck(Path)(path)

@@ -59,6 +59,7 @@ class FiniteCheck:
     ) -> None:
         """Find the fields that hold numbers."""
         numbers, arrays = _float_fields(message_type)
+        self._lists = [name for name in _list_fields(message_type) if name not in checked]
         self._names = [name for name in numbers if name not in unbounded]
         self._arrays = [name for name in arrays if name not in (*unbounded, *checked)]
         self._unbounded = [name for name in unbounded if name in numbers]
@@ -82,6 +83,12 @@ class FiniteCheck:
             if not abs(array.sum()) < math.inf and not np.isfinite(array).all():
                 place = int(np.argmin(np.isfinite(array)))
                 raise _not_finite(f"{name}[{place}]", float(array[place]))
+        for name in self._lists:
+            for place, one in enumerate(attrgetter(name)(message)):
+                try:
+                    _check_of(type(one))(one)
+                except SolverError as error:
+                    raise SolverError(f"{name}[{place}]: {error}") from None
         for name in self._unbounded:
             if math.isnan(attrgetter(name)(message)):
                 raise _not_finite(name, math.nan)
@@ -120,6 +127,23 @@ def _float_fields(message_type: Any) -> tuple[list[str], list[str]]:
             numbers += [f"{name}.{below}" for below in below_numbers]
             arrays += [f"{name}.{below}" for below in below_arrays]
     return numbers, arrays
+
+
+@cache
+def _check_of(message_type: Any) -> FiniteCheck:
+    return FiniteCheck(message_type)
+
+
+@cache
+def _list_fields(message_type: Any) -> list[str]:
+    """Return the dotted names of a message's lists of messages."""
+    lists: list[str] = []
+    for name, kind, inner in _fields(message_type):
+        if inner is not None:
+            lists += [f"{name}.{below}" for below in _list_fields(inner)]
+        elif "/" in kind:
+            lists.append(name)
+    return lists
 
 
 def _fields(message_type: Any) -> Iterator[tuple[str, str, Any]]:
