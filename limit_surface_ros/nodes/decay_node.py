@@ -366,7 +366,7 @@ def describe_model(
 
 SERVICES = (
     Service(ListDecays, "list_models", DecayNode.list_models),
-    Service(DescribeModel, "describe_model", describe_model),
+    Service(DescribeModel, "describe_model", describe_model, long=True),
     *running_decay.SERVICES,
     *sliding_services.SERVICES,
 )

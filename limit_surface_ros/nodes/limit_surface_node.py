@@ -38,7 +38,7 @@ from limit_surface_ros.nodes.models.model_info import ModelList
 from limit_surface_ros.nodes.models.model_node import COMMON_SETTINGS, ModelNode
 from limit_surface_ros.nodes.serving import spin
 from limit_surface_ros.nodes.serving.batches import Batches, empty_rows
-from limit_surface_ros.nodes.serving.endpoints import STREAM_DEPTH, WAITING_LARGE, Service
+from limit_surface_ros.nodes.serving.endpoints import STREAM_DEPTH, Service
 from limit_surface_ros.nodes.serving.settings import Setting
 from limit_surface_ros.surface.frames import power
 from limit_surface_ros.surface.kinds.dissipation_scatter import region_quantile
@@ -310,20 +310,18 @@ SERVICES = (
         WrenchesToTwists,
         "wrenches_to_twists",
         wrenches_to_twists,
-        depth=WAITING_LARGE,
         checked=("twists", "load_factors"),
     ),
     Service(
         TwistsToWrenches,
         "twists_to_wrenches",
         twists_to_wrenches,
-        depth=WAITING_LARGE,
         checked=("wrenches", "powers"),
     ),
     Service(Push, "push", push_at_a_point),
     # A normal force that no model file states is NaN there.
     Service(ListModels, "list_models", LimitSurfaceNode.list_models, checked=("models",)),
-    Service(DescribeModel, "describe_model", LimitSurfaceNode.describe_model),
+    Service(DescribeModel, "describe_model", LimitSurfaceNode.describe_model, long=True),
 )
 
 

@@ -43,7 +43,8 @@ STREAM_DEPTH = 1000
 TAKEN_IN_A_TURN = 100
 # Requests that wait while one is answered: of more than the usual 10 the oldest would be lost.
 WAITING = 1000
-# The same of services whose replies are large: 64 answers to 10 000 rows are 20 MB.
+# The same of services whose replies may be long: as many are kept for clients that are slow to
+# take them or have stopped, and 64 answers to 10 000 rows are 20 MB.
 WAITING_LARGE = 64
 # Messages of one topic that wait, for a transform say; of more the oldest is refused.
 MOST_WAITING = 500
@@ -86,8 +87,7 @@ class Service(NamedTuple):
         handler: Function or coroutine function of the node, the request and the response: fills
             the response, or raises.
         unbounded: Fields of the response that may be infinite, by their dotted names.
-        depth: How many requests may wait to be taken, and how many replies are kept for clients
-            that are slow to take them or have stopped: few where replies are large.
+        long: Whether its replies may be long even if they have no list.
         checked: Fields that the handler has filled by `convert.finite_rows`: they may be long, and
             are not looked at again.
     """
@@ -96,7 +96,7 @@ class Service(NamedTuple):
     name: str
     handler: Callable[[Any, Any, Any], Any]
     unbounded: tuple[str, ...] = ()
-    depth: int = WAITING
+    long: bool = False
     checked: tuple[str, ...] = ()
 
 
@@ -167,7 +167,8 @@ class Endpoints:
         def handler(request: Any, response: Any) -> Any:
             return service.handler(self._node, request, response)
 
-        self._serve(service.type, service.name, handler, refused, check, service.depth)
+        depth = WAITING_LARGE if service.long or _has_lists(service.type.Response) else WAITING
+        self._serve(service.type, service.name, handler, refused, check, depth)
 
     def serve_trigger(self, name: str, handler: Callable[[Any, Any], Any], unchanged: str) -> None:
         """Serve `~/name` of type std_srvs/Trigger, whose answers hold no error code.
@@ -357,6 +358,12 @@ class Endpoints:
     def count_time(self, seconds: float) -> None:
         """Count a stretch of time [s] in which nobody else had a turn."""
         self._health.times.add(seconds)
+
+
+def _has_lists(message_type: Any) -> bool:
+    """Return whether a message has a list, so that it may be of any length."""
+    kinds = message_type.get_fields_and_field_types().values()
+    return any(kind.startswith("sequence<") or kind == "nav_msgs/Path" for kind in kinds)
 
 
 def _ending_error() -> UnavailableError:
