@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from limit_surface_ros.checks import as_coordinates
+from limit_surface_ros.checks import SMALLEST, as_coordinates
 from limit_surface_ros.errors import OutlineError, RangeError, ShapeError
 from limit_surface_ros.motion.push_checks import as_complex, as_vectors_of
 
@@ -196,7 +196,8 @@ class Polygon(Outline):
         wide = radius[:, np.newaxis]
         height = starts @ self._outward.T - self._at_outward
         closing = directions @ self._outward.T
-        approaches = closing < 0.0
+        # Slower than that it comes to no body's length.
+        approaches = closing < -SMALLEST
         moved = (wide - height) / np.where(approaches, closing, -1.0)
         place = starts @ self._along.T - self._at_along + moved * (directions @ self._along.T)
         slack = 1e-12 * self._lengths

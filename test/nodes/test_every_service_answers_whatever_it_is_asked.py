@@ -97,8 +97,9 @@ def good(name, kind):
     if hasattr(asked, "tip_starts"):
         asked.poses = array("d", [0.0, 0.0, 0.0])
         asked.tip_starts, asked.tip_ends = array("d", [-0.12, 0.0]), array("d", [-0.08, 0.0])
-    if hasattr(asked, "contact"):
-        asked.contact.x, asked.normal.x, asked.velocity.x = -0.05, 1.0, 0.1
+    for field, along in (("contact", -0.05), ("normal", 1.0), ("velocity", 0.1)):
+        if hasattr(asked, field) and hasattr(getattr(asked, field), "x"):
+            getattr(asked, field).x = along
     if name.startswith(("predict_", "required_")) and hasattr(asked, "wrench"):
         asked.wrench = load_message(10 * SECOND)
     return asked
