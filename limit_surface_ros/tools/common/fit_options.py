@@ -112,8 +112,8 @@ def add_fit_options(parser: argparse.ArgumentParser) -> None:
     few.add_argument(
         "--auto",
         action="store_true",
-        help="choose kind, terms, weight and the prior of the fit (the pressure on the "
-        "ground that fits the pushes, or an ellipsoid) by cross-validation; leaves the options "
+        help="mix models of the pressure on the ground that fits the pushes, of three free terms "
+        "and an ellipsoid, and tell by cross-validation how sure that is; leaves the options "
         "above aside",
     )
     few.add_argument(
