@@ -10,6 +10,7 @@ returns, so that another can go on from the last of them.
 from __future__ import annotations
 
 import datetime
+import os
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -74,6 +75,7 @@ class _Learning:
         return model
 
 
+_NICENESS = 10
 _learning: _Learning | None = None
 
 
@@ -86,6 +88,8 @@ def begin(
         DataError: The state is none.
     """
     global _learning
+    # What is learnt can wait, requests cannot: they have the cores first.
+    os.nice(_NICENESS)
     if state is None:
         online = OnlineSurface(prior.surface, forgetting=forgetting)
     else:
