@@ -388,7 +388,7 @@ def main() -> None:
         process(OURS) as ours,
         process(OURS_DECAY),
         process(BARE) as bare,
-        ServiceClient("bench") as client,
+        ServiceClient("bench", patience=60.0) as client,
     ):
         service_rows(client)
         kind_rows(client)

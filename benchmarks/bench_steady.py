@@ -95,7 +95,7 @@ def main(calls: int) -> None:
         folder_of_kinds() as (folder, names),
         process(serving("kinds", folder)),
         process(BARE),
-        ServiceClient("bench") as client,
+        ServiceClient("bench", patience=60.0) as client,
     ):
         print(f"### The slowest of {calls} calls of {FEW} rows in a row\n")
         print(
