@@ -70,29 +70,34 @@ def test_the_figures_of_errors_judge_claims_and_leave_their_numbers(tmp_path):
     assert len(list((tmp_path / "models").glob("*.yaml"))) > 20
 
 
-def test_what_chapter_3_leaves_open_is_measured(tmp_path):
+def findings_of(number, folder):
+    study = next(study for study in STUDIES if study.number == number)
+    return study.carry_out(TINY, Store(folder, TINY))
+
+
+def test_the_convex_polynomial_stands_beside_that_of_least_squares(tmp_path):
     pytest.importorskip("cvxpy", reason="cvxpy fits the convex polynomial")
-    store = Store(tmp_path, TINY)
-    weights, polynomials, minima = (
-        next(study for study in STUDIES if study.number == number).carry_out(TINY, store)
-        for number in ("B.3", "B.4", "B.5")
-    )
-    assert weights.tables["weights"]["weight"].tolist() == [0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0]
-    dented, better = polynomials.claims
+    found = findings_of("B.4", tmp_path)
+    dented, better = found.claims
     assert dented.verdict == "holds partly"
-    assert set(polynomials.pictures) == {"sections", "errors"}
+    assert set(found.pictures) == {"sections", "errors"}
     assert better.measured
-    convex = fitted(Fit("three_points", "convex_polynomial", "J1"), store)
+    convex = fitted(Fit("three_points", "convex_polynomial", "J1"), Store(tmp_path, TINY))
     assert is_convex(convex).dented_share == 0.0
-    assert len(minima.tables["minima"]["fit"]) == 16
+
+
+@pytest.mark.nightly
+def test_weights_and_minima_are_counted_for_every_fit(tmp_path):
+    weights = findings_of("B.3", tmp_path).tables["weights"]["weight"]
+    assert weights.tolist() == [0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0]
+    assert len(findings_of("B.5", tmp_path).tables["minima"]["fit"]) == 16
 
 
 def test_without_cvxpy_the_convex_polynomial_is_left_out_and_the_page_says_so(
     tmp_path, monkeypatch
 ):
     monkeypatch.setitem(sys.modules, "cvxpy", None)
-    study = next(study for study in STUDIES if study.number == "B.4")
-    findings = study.carry_out(TINY, Store(tmp_path, TINY))
+    findings = findings_of("B.4", tmp_path)
     assert "cvxpy" in findings.remarks
     assert not findings.pictures
 
