@@ -237,3 +237,23 @@ def test_at_the_rim_of_a_facet_the_inside_is_returned_and_told():
     norms = PowerSum([ONES, np.diag([1.0, 1.0, 0.0])], [0.5, 0.5])
     assert norms.wrench_is_smooth_at([0.5, 0.0, 1.0])
     assert not norms.wrench_is_smooth_at([1.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize("force", [1e-100, 1e100])
+@pytest.mark.parametrize("kind", [PowerSum.norms, Dissipation, PowerSum.thesis])
+def test_derivatives_are_numbers_in_any_unit(kind, force):
+    forms = MODELS["norms_4"].matrices[:2]
+    usual, scaled_up = (
+        kind(forms, scaling=Scaling(0.1, 1.0)),
+        kind(forms, scaling=Scaling(0.1, force)),
+    )
+    loads, twists = vectors("norms_4", 20)[:-2], vectors("norms_4", 20)[:-2]
+    for method, given, factor in (
+        ("twist_jacobian", loads, 1.0 / force),
+        ("quadratic_twist", loads, force**-2),
+        ("wrench_jacobian", twists, force),
+    ):
+        right = getattr(usual, method)(given)[1]
+        unit = 1.0 if method == "wrench_jacobian" else force
+        found = getattr(scaled_up, method)(given * unit)[1]
+        assert np.allclose(found / factor, right, rtol=1e-9, atol=1e-12 * np.abs(right).max())

@@ -39,6 +39,8 @@ PARALLEL = 1e-14
 # The same of a point that is as right as rounding lets it be.
 ROUNDED = 1e-27
 _BESIDE = 1e-6
+# Square of a vector's length beyond which its powers may not be numbers.
+_LARGE = 1e120
 # One over the curvature that stands for that of a kink.
 _SOFTNESS = 1e-12
 # Rows of a symmetric matrix as entries of its six.
@@ -121,7 +123,7 @@ def gradients_and_hessians(points: Floats, turning: Turning) -> tuple[Floats, Fl
     along = np.einsum("im,im->m", normals, points)
     # grad g = scale N, and Hess g = scale (K - part N N') with Hess g x = 0.
     scale = values / along
-    part = np.einsum("im,im->m", products(six, points), points) / (along * along)
+    part = np.einsum("im,im->m", products(six, points), points) / along / along
     weight = values * scale
     outer = scale * scale - weight * part
     hessians = six * weight
@@ -144,6 +146,12 @@ def of_support(normals: Floats, points: Floats, gauge: Gauge) -> tuple[Floats, F
         points: Their support points x on the unit surface of a gauge, shape (3, m).
         gauge: The gauge.
     """
+    sizes = squared_lengths(normals)
+    if not (sizes.min(initial=1.0) > 1.0 / _LARGE and sizes.max(initial=1.0) < _LARGE):
+        # Of loads in units that are far from theirs: what follows takes fourth powers.
+        lengths = np.sqrt(sizes)
+        points, found, whole = of_support(normals / lengths, points, gauge)
+        return points, found / lengths, whole
     turning = gauge.turning(points)
     found, whole = _of_turning(normals, points, turning)
     off, squares = _off(normals, points, turning)
