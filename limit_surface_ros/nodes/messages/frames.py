@@ -25,8 +25,8 @@ from limit_surface_ros.errors import (
 )
 from limit_surface_ros.nodes.messages.convert import nanoseconds
 from limit_surface_ros.nodes.messages.static_transforms import StaticTransforms
-from limit_surface_ros.nodes.serving.endpoints import Waiting
 from limit_surface_ros.nodes.serving.settings import Setting
+from limit_surface_ros.nodes.serving.waiting import Waiting
 from limit_surface_ros.surface.frames import RigidTransform
 
 if TYPE_CHECKING:

@@ -16,9 +16,10 @@ from std_srvs.srv import Trigger
 from limit_surface_ros.files.model_set import Model, Named
 from limit_surface_ros.nodes.models.model_host import ModelHost
 from limit_surface_ros.nodes.serving import diagnostics, parameters, spin
-from limit_surface_ros.nodes.serving.endpoints import LOG_PERIOD, Endpoints, Waiting
+from limit_surface_ros.nodes.serving.endpoints import LOG_PERIOD, Endpoints
 from limit_surface_ros.nodes.serving.parameters import Parameters
 from limit_surface_ros.nodes.serving.peers import Peers
+from limit_surface_ros.nodes.serving.waiting import Waiting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

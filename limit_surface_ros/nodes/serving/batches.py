@@ -13,7 +13,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from limit_surface_ros.errors import UnavailableError
-from limit_surface_ros.nodes.serving.endpoints import Waiting
+from limit_surface_ros.nodes.serving.waiting import Waiting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator

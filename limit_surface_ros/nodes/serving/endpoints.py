@@ -2,16 +2,13 @@
 """Services and topics whose handlers may raise, wait and take long, without harm to the others.
 
 A handler is a function or a coroutine. What it raises becomes an error code, a count and a line in
-the log. It may wait (`await Waiting()`) and, if it takes long, let the others have a turn
-(`await endpoints.give_way()`). `Endpoints` resumes coroutines by itself: of rclpy's executors one
-looks at each of those that wait whenever anything happens, and the other knows none.
+the log. It may wait (`waiting`) and, if it takes long, let the others have a turn
+(`await endpoints.give_way()`).
 """
 
 from __future__ import annotations
 
 import collections
-import functools
-import inspect
 import math
 import time
 import traceback
@@ -26,9 +23,10 @@ from limit_surface_ros.errors import LimitSurfaceError, UnavailableError, shorte
 from limit_surface_ros.nodes.serving import answers
 from limit_surface_ros.nodes.serving.diagnostics import Health, InputAge
 from limit_surface_ros.nodes.serving.peers import LostMessages
+from limit_surface_ros.nodes.serving.waiting import Handling, Waiting
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine, Iterator
+    from collections.abc import Callable
 
     from rclpy.node import Node
     from rclpy.publisher import Publisher
@@ -48,34 +46,6 @@ WAITING = 1000
 WAITING_LARGE = 64
 # Messages of one topic that wait, for a transform say; of more the oldest is refused.
 MOST_WAITING = 500
-
-
-class Waiting:
-    """Something that a coroutine waits for until somebody settles it."""
-
-    def __init__(self) -> None:
-        """Wait."""
-        self.settled = False
-        self.refused_by: Exception | None = None
-        # Set by who drives the coroutine.
-        self.resume: Callable[[], None] | None = None
-
-    def settle(self, refused_by: Exception | None = None) -> None:
-        """End the waiting, by raising if there is an error; only the first call counts."""
-        if self.settled:
-            return
-        self.settled, self.refused_by = True, refused_by
-        # Let go of it: requests and answers of megabytes hang on it, in a circle.
-        resume, self.resume = self.resume, None
-        if resume is not None:
-            resume()
-
-    def __await__(self) -> Iterator[Waiting]:
-        """Suspend the coroutine until this is settled."""
-        while not self.settled:
-            yield self
-        if self.refused_by is not None:
-            raise self.refused_by
 
 
 class Service(NamedTuple):
@@ -215,7 +185,7 @@ class Endpoints:
             if self.ending:
                 ended(_ending_error())
             else:
-                _Handling(self, handler, call, ended).begin()
+                Handling(self._count_time, handler, call, ended).begin()
 
         # rclpy calls this with what the callback returns, once it has; the answer is sent later.
         service = self._node.create_service(
@@ -349,13 +319,13 @@ class Endpoints:
             if name in self._health.inputs:
                 self._health.inputs[name].last = self._node.get_clock().now().nanoseconds
 
-        _Handling(self, handler, (message,), ended, queue).begin()
+        Handling(self._count_time, handler, (message,), ended, queue).begin()
         if len(queue) > MOST_WAITING:
             queue[0].settle(
                 UnavailableError(f"more than {MOST_WAITING} messages wait for transforms")
             )
 
-    def count_time(self, seconds: float) -> None:
+    def _count_time(self, seconds: float) -> None:
         """Count a stretch of time [s] in which nobody else had a turn."""
         self._health.times.add(seconds)
 
@@ -368,70 +338,3 @@ def _has_lists(message_type: Any) -> bool:
 
 def _ending_error() -> UnavailableError:
     return UnavailableError("the node is ending")
-
-
-class _Handling:
-    """One request or message on its way through a handler.
-
-    Args:
-        endpoints: Whose it is.
-        handler: Function or coroutine function.
-        arguments: What it is called with.
-        ended: Called at the end, with an error or None.
-        queue: Where those that wait are kept, the oldest first.
-    """
-
-    def __init__(
-        self,
-        endpoints: Endpoints,
-        handler: Callable[..., Any],
-        arguments: tuple[Any, ...],
-        ended: Callable[[Exception | None], None],
-        queue: collections.deque[Waiting] | None = None,
-    ) -> None:
-        self._endpoints = endpoints
-        self._handler = handler
-        self._arguments = arguments
-        self._ended = ended
-        self._queue = queue
-        self._running: Coroutine[Any, Any, None] | None = None
-
-    def begin(self) -> None:
-        """Call the handler."""
-        start = time.perf_counter()
-        error = None
-        try:
-            self._running = self._handler(*self._arguments)
-        except Exception as raised:
-            error = raised
-        if error is not None or not inspect.iscoroutine(self._running):
-            self._end(start, error)
-        else:
-            self._step(start)
-
-    def _step(self, start: float) -> None:
-        """Run the coroutine to its end, or to where it waits."""
-        error = None
-        try:
-            waiting: Waiting = self._running.send(None)
-        except StopIteration:
-            pass
-        except Exception as raised:
-            error = raised
-        else:
-            self._endpoints.count_time(time.perf_counter() - start)
-            waiting.resume = functools.partial(self._resume, waiting)
-            if self._queue is not None:
-                self._queue.append(waiting)
-            return
-        self._end(start, error)
-
-    def _resume(self, waiting: Waiting) -> None:
-        if self._queue is not None:
-            self._queue.remove(waiting)
-        self._step(time.perf_counter())
-
-    def _end(self, start: float, error: Exception | None) -> None:
-        self._endpoints.count_time(time.perf_counter() - start)
-        self._running, self._arguments = None, ()
-        self._ended(error)
