@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-# The palette of Okabe and Ito (2008), told apart with any kind of colour vision. Yellow comes
-# last: it is too light for a thin line on white.
+# The palette of Okabe and Ito (2008), told apart with any kind of colour vision, but
+# for yellow: it is too light for a thin line on white.
 BLACK = "#000000"
 BLUE = "#0072B2"
 VERMILION = "#D55E00"
@@ -29,7 +29,6 @@ GREEN = "#009E73"
 PURPLE = "#CC79A7"
 SKY = "#56B4E9"
 ORANGE = "#E69F00"
-YELLOW = "#F0E442"
 GREY = "#777777"
 CYCLE = (BLUE, VERMILION, GREEN, PURPLE, SKY, ORANGE, BLACK)
 # Told apart by more than colour, also on a grey printer.

@@ -28,8 +28,6 @@ _EXACT, _ACCEPTED = 1e-14, 1e-9
 _LEAST_SHARE = 1e-4
 # By how much creases are rounded off, in parts of the acceleration.
 _ROUNDINGS = [10.0**-power for power in range(2, 12)]
-# Part of its largest value below which |R_k q| is on the crease.
-ON_CREASE = 1e-9
 # Excess of a resting term's force over its limit that is rounding.
 LIMIT_TOLERANCE = 1e-9
 

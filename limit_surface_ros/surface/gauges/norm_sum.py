@@ -7,12 +7,12 @@ they are gauges of loads. All arrays are scaled columns.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from limit_surface_ros.surface.gauges.corners import Corners
-from limit_surface_ros.surface.gauges.gauge import Gauge, Turning
+from limit_surface_ros.surface.gauges.gauge import Turning
 from limit_surface_ros.surface.gauges.jacobians import six_of, sum_of_terms, take_outer
 from limit_surface_ros.surface.linalg import squared_lengths
 
@@ -29,14 +29,6 @@ _APART = 1e-9
 _ROUND = 1e-2
 # Elements of one array of points by motions, of which several stay in the processor's cache.
 _ELEMENTS = 2**14
-
-
-class NormSumGauge(Gauge, Protocol):
-    """A sum of norms sum_k |R_k x|, each smoothed to sqrt(|R_k x|^2 + (e size)^2)."""
-
-    def corners(self) -> Corners | None:
-        """Return the points where one norm is zero: at each many normals meet."""
-        ...
 
 
 class NormSum:
