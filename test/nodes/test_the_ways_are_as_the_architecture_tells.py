@@ -75,7 +75,10 @@ def surface_file(tmp_path):
 def entered_by_a_call(
     ros, node_class, service, name, request, within: str = "", **parameters
 ) -> list[str]:
-    """Return the modules that a node enters to answer a request, for the third time."""
+    """Return the modules that a node enters to answer a request, and for nothing else.
+
+    Of five calls the first may have more to make, and a timer may be due during any: the shortest.
+    """
     import rclpy
     from rclpy.executors import SingleThreadedExecutor
 
@@ -89,16 +92,18 @@ def entered_by_a_call(
     while not node.host.prepared:
         executor.spin_once(timeout_sec=0.05)
     try:
-        for _ in range(3):
+        ways = []
+        for _ in range(5):
             future = client.call_async(request)
             with Entered(within) as modules:
                 while not future.done():
                     executor.spin_once(timeout_sec=0.05)
             assert future.result().error_code == 0, future.result().error_msg
+            ways.append(modules)
     finally:
         executor.shutdown()
         node.destroy_node()
-    return modules
+    return min(ways, key=len)
 
 
 def check(way: str, entered: list[str]) -> None:
