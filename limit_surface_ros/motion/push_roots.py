@@ -27,6 +27,8 @@ _WIDTH = 4.5e-16
 # A bracket that has not halved in so many steps is halved: beside a kink Newton's steps are short.
 _PATIENCE = 3
 _MAX_ROUNDS = 400
+# Resistance to a turn, in parts of that to a motion of the contact, that is rounding.
+_FREE = 1e-14
 # Share of finished columns above which the rest is moved together.
 _COMPRESS = 0.75
 
@@ -116,8 +118,9 @@ def turning_rates(
     largest = np.add.reduce(np.sqrt(g))
     still, _, _ = section.dissipation(lines, np.zeros(count))
     # D(V_0 + w d) >= |w| D(d) - D(V_0), which the least does not exceed.
-    safe = np.where(largest > 0.0, largest, 1.0)
-    reach = np.where(largest > 0.0, 2.0 * still / safe, 0.0)
+    # A body on one support point that is pushed there may turn as it likes: it does not.
+    turns = largest > _FREE * still
+    reach = np.where(turns, 2.0 * still / np.where(turns, largest, 1.0), 0.0)
     # Terms weigh as at rest of the contact.
     weight = g / np.sqrt(np.maximum(g * place * place + least, 1e-300))
     w = np.add.reduce(weight * place) / np.maximum(np.add.reduce(weight), 1e-300)

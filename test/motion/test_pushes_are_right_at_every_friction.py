@@ -223,6 +223,13 @@ def test_what_are_no_pushes_is_refused(arguments, error, message):
         pushes(surface, *arguments)
 
 
+def test_many_pushes_at_the_only_support_of_a_body_do_not_turn_it():
+    body = PointContacts([[0.01, 0.02]], [1.0], SCALING)
+    found = pushes(body, [[0.01, 0.02]] * 2, [[0.0, 1.0]] * 2, 0.3, [[0.0, 1.0], [0.1, 1.0]])
+    np.testing.assert_allclose(found.twists, [[0.0, 1.0, 0.0], [0.1, 1.0, 0.0]], atol=1e-9)
+    np.testing.assert_allclose(np.hypot(*found.wrenches[:, :2].T), 1.0)
+
+
 def test_no_pushes_are_no_answers_and_leaving_is_told():
     surface = PowerSum.thesis([np.eye(3)], SCALING)
     assert len(pushes(surface, np.zeros((0, 2)), np.zeros((0, 2)), 0.3, np.zeros((0, 2)))) == 0
