@@ -17,7 +17,8 @@ from limit_surface_ros.nodes.serving import middleware
 @pytest.fixture(autouse=True)
 def elsewhere(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.delenv(middleware.VARIABLE, raising=False)
+    for name in (middleware.VARIABLE, "FASTDDS_BUILTIN_TRANSPORTS"):
+        monkeypatch.delenv(name, raising=False)
 
 
 def test_nodes_are_made_with_the_settings_that_ship_and_children_do_not_inherit_them():
@@ -34,5 +35,9 @@ def test_settings_of_the_user_are_left_alone(monkeypatch, tmp_path):
     assert os.environ[middleware.VARIABLE] == "/of/the/user.xml"
     monkeypatch.delenv(middleware.VARIABLE)
     (tmp_path / "DEFAULT_FASTRTPS_PROFILES.xml").write_text("<profiles/>")
+    with middleware.settings():
+        assert middleware.VARIABLE not in os.environ
+    (tmp_path / "DEFAULT_FASTRTPS_PROFILES.xml").unlink()
+    monkeypatch.setenv("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
     with middleware.settings():
         assert middleware.VARIABLE not in os.environ

@@ -17,12 +17,15 @@ if TYPE_CHECKING:
 # itself; other middlewares look at neither.
 VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _FOUND = "DEFAULT_FASTRTPS_PROFILES.xml"
+# By which a user chooses transports, which ours would take the place of.
+_TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
 
 
 @contextlib.contextmanager
 def settings() -> Iterator[None]:
     """Name config/fastdds.xml to nodes that are made in the block, if the user names no file."""
-    file = None if os.environ.get(VARIABLE) or Path(_FOUND).exists() else _shipped()
+    theirs = os.environ.get(VARIABLE) or os.environ.get(_TRANSPORTS) or Path(_FOUND).exists()
+    file = None if theirs else _shipped()
     if file is None:
         yield
         return
