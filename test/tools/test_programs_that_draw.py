@@ -153,6 +153,7 @@ def test_reproduce_thesis_makes_the_figures_it_is_asked_for(tmp_path, capsys):
     out = tmp_path / "a folder" / "out"
     assert reproduce_thesis.main([str(out), "--quick", "--figures", "2.1", "3.2"]) == 0
     assert sorted(path.name for path in out.iterdir()) == [
+        "claims.md",
         "figure_2_01",
         "figure_3_02",
         "index.html",
