@@ -5,20 +5,22 @@ from __future__ import annotations
 
 import html
 import json
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from limit_surface_ros.errors import DataError
 from limit_surface_ros.export.javascript import javascript_engine, javascript_numbers
 from limit_surface_ros.export.portable import portable
-from limit_surface_ros.export.texts import filled
+from limit_surface_ros.export.texts import filled, template
+from limit_surface_ros.surface.kinds import dissipation_scatter
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.files.surface_file import SurfaceModel
+    from limit_surface_ros.surface.kinds.dissipation_scatter import TwistScatter
 
 # Models beside each other, each with a colour of its own.
 MOST_MODELS = 4
@@ -26,6 +28,8 @@ MOST_MODELS = 4
 _DISC = 48
 # Fewest points of a contact whose hull is an outline.
 _HULL = 3
+# Share of real motions in the region that is shown: "9 of 10", as the page says.
+_SHARE = 0.9
 
 
 def explorer_page(models: Sequence[SurfaceModel]) -> str:
@@ -36,7 +40,8 @@ def explorer_page(models: Sequence[SurfaceModel]) -> str:
             first: its own, the hull of its support points, or a disc of its characteristic length.
 
     Raises:
-        DataError: There are none or more models, or the kind of one cannot be exported.
+        DataError: There are none or more models, the kind of one cannot be exported, or what
+            stands under `fit: uncertainty` of one is not what fits write.
     """
     if not 1 <= len(models) <= MOST_MODELS:
         raise DataError(f"the page holds 1 to {MOST_MODELS} models, got {len(models)}")
@@ -44,6 +49,7 @@ def explorer_page(models: Sequence[SurfaceModel]) -> str:
     for model in models:
         each = json.loads(javascript_numbers(portable(model.surface), model.name))
         each["outline"] = outline_of(model).tolist()
+        each["scatter"] = model.uncertain and scatter_numbers(model.uncertain.scatter)
         numbers.append(each)
     names = ", ".join(model.name for model in models)
     return filled(
@@ -51,10 +57,35 @@ def explorer_page(models: Sequence[SurfaceModel]) -> str:
         {
             "TITLE": html.escape(f"Limit surface {names}"),
             "ENGINE": javascript_engine(),
+            "SCATTER": scatter_script(),
             # Within a script, no text may look like its end.
             "MODELS": json.dumps(numbers).replace("</", "<\\/"),
         },
     )
+
+
+def scatter_script() -> str:
+    """Return the text of `makeScatter(numbers)`, which stands behind that of `makeSurface`."""
+    return template("scatter.js").partition("\n")[2].strip("\n")
+
+
+def scatter_numbers(scatter: TwistScatter) -> dict[str, Any]:
+    """Return the numbers of a model's scatter as `makeScatter` takes them, plain for JSON."""
+    return {
+        "matrices": scatter.matrices.tolist(),
+        "folds": [fold.tolist() for fold in scatter.folds],
+        "scale": float(np.exp(scatter.log_scale)),
+        "own": dissipation_scatter.OWN,
+        "friction": {
+            "deviation": dissipation_scatter.FRICTION,
+            "saturated": dissipation_scatter.SATURATED,
+        },
+        "jackknife": {
+            "factor": dissipation_scatter.JACKKNIFE,
+            "saturated": dissipation_scatter.JACKKNIFE_SATURATED,
+        },
+        "quantile": dissipation_scatter.region_quantile(_SHARE),
+    }
 
 
 def outline_of(model: SurfaceModel) -> Floats:
