@@ -144,11 +144,14 @@ class ContactScalar:
         # Of no turning, and as far to the side of the root as need be.
         side = -1.0 if moment(0.0) > 0.0 else 1.0
         near, far = 0.0, side / length
+        unit = force * length
+        # A body on one support point that is pushed there may turn as it likes: it does not.
+        if abs(moment(0.0)) <= _EXACT * (unit + force * hypot(self._x, self._y)):
+            far = 0.0
         for _ in range(_DOUBLINGS):
-            if side * moment(far) >= 0.0:
+            if side * moment(far) >= 0.0 or far == 0.0:
                 break
             near, far = far, 2.0 * far
-        unit = force * length
         low, high = root_bracket(
             moment,
             min(near, far),

@@ -223,11 +223,38 @@ def test_what_are_no_pushes_is_refused(arguments, error, message):
         pushes(surface, *arguments)
 
 
-def test_many_pushes_at_the_only_support_of_a_body_do_not_turn_it():
+def test_a_push_at_the_only_support_of_a_body_does_not_turn_it():
     body = PointContacts([[0.01, 0.02]], [1.0], SCALING)
-    found = pushes(body, [[0.01, 0.02]] * 2, [[0.0, 1.0]] * 2, 0.3, [[0.0, 1.0], [0.1, 1.0]])
-    np.testing.assert_allclose(found.twists, [[0.0, 1.0, 0.0], [0.1, 1.0, 0.0]], atol=1e-9)
+    motions = np.array([[0.0, 1.0], [0.1, 1.0], [-0.07, 0.3]])
+    found = pushes(body, [[0.01, 0.02]] * 3, [[0.0, 1.0]] * 3, 0.3, motions)
+    np.testing.assert_allclose(found.twists, np.pad(motions, ((0, 0), (0, 1))), atol=1e-9)
     np.testing.assert_allclose(np.hypot(*found.wrenches[:, :2].T), 1.0)
+    for motion in motions:
+        alone = push(body, [0.01, 0.02], [0.0, 1.0], 0.3, motion)
+        np.testing.assert_allclose(alone.twist, [*motion, 0.0], atol=1e-9)
+        assert alone.mode is ContactMode.STICK
+
+
+@pytest.mark.parametrize("friction", [0.0, 1.0, 3.0, np.inf])
+@pytest.mark.parametrize("rank", [1, 2])
+def test_pushes_whose_friction_cone_ends_in_a_corner_are_right(rank, friction):
+    rng = np.random.default_rng(4)
+    angles = np.concatenate([[0.0, 1.5707, -1.5707], rng.uniform(-1.5, 1.5, 21)])
+    velocities = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    for place, side in ((0.0, 1.0), (1.0, -1.0), (2.0, 1.0)):
+        point = SCALING.characteristic_length * place * np.array([-1.0, 0.5])
+        x, y = (0.0, side) if friction == np.inf else (1.0, side * friction)
+        # The first norm does not resist the force at the edge of the cone: a corner is there.
+        across = np.array([y, -x, 0.0])
+        corner = np.array([x, y, place * (-y - 0.5 * x)])
+        rows = np.array([across, np.cross(corner, across)])[:rank]
+        surface = PowerSum.norms([rows.T @ rows, np.eye(3)], SCALING)
+        points, normals = np.tile(point, (24, 1)), np.tile([1.0, 0.0], (24, 1))
+        found = pushes(surface, points, normals, friction, velocities)
+        assert not wrong(surface, points, normals, friction, velocities, found).any()
+        for row in range(24):
+            alone = push(surface, point, [1.0, 0.0], friction, velocities[row])
+            assert alone.mode is found[row].mode
 
 
 def test_no_pushes_are_no_answers_and_leaving_is_told():
