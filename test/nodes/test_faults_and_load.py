@@ -23,6 +23,7 @@ from limit_surface_interfaces.srv import (
     DescribeModel,
     ListModels,
     Push,
+    SimulatePushes,
     TwistsToWrenches,
     TwistToWrench,
     WrenchesToTwists,
@@ -32,6 +33,7 @@ from rclpy.serialization import serialize_message
 from std_msgs.msg import Header
 
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
+from limit_surface_ros.motion.outline import Polygon
 from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
 from limit_surface_ros.nodes.messages import convert
 from limit_surface_ros.nodes.serving.answers import FiniteCheck
@@ -40,6 +42,7 @@ from limit_surface_ros.surface.scaling import Scaling
 from node_helpers import Program, planar_twist, processor_ticks, wrench_message
 from process_helpers import WAIT
 
+PUSHES = 100
 CODES = {
     ErrorCode.NONE,
     ErrorCode.NOT_FINITE,
@@ -275,30 +278,36 @@ def test_requests_of_a_million_rows_leave_no_memory_behind(ros, client_node, mod
 def test_a_signal_during_a_call_ends_the_node_cleanly_after_its_answer(
     ros, client_node, tmp_path, number, executor
 ):
-    # Slow, so that the signal comes while it is answered.
+    # The work is long, so that the signal comes while it is done; the request is short, so that
+    # none of it is still on its way when the node stops listening.
     factors = np.random.default_rng(0).normal(size=(24, 3, 2))
     surface = Dissipation(factors @ factors.transpose(0, 2, 1), Scaling(0.05, 2.0))
     path = tmp_path / "slow.yaml"
-    write_surface_model(SurfaceModel(name="slow", surface=surface), path)
-    wrenches = np.random.default_rng(1).normal(size=(60_000, 3))
+    square = Polygon([[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]])
+    write_surface_model(SurfaceModel(name="slow", surface=surface, outline=square), path)
+    heights = np.linspace(-0.08, 0.08, PUSHES)
+    request = SimulatePushes.Request(tip_radius=0.005, friction=0.3, accuracy=1e-8)
+    request.header.frame_id = "table"
+    request.poses = convert.flat_of(np.zeros((PUSHES, 3)))
+    request.tip_starts = convert.flat_of(np.stack([np.full(PUSHES, -0.2), heights], axis=1))
+    request.tip_ends = convert.flat_of(np.stack([np.full(PUSHES, 0.2), heights], axis=1))
     options = "-p", f"model_files:=['{path}']", "-p", f"executor:={executor}"
     with Program("limit_surface_node", "--ros-args", *options) as program:
-        name = "/limit_surface/wrenches_to_twists"
-        client = client_node.create_client(WrenchesToTwists, name)
+        client = client_node.create_client(SimulatePushes, "/limit_surface/simulate_pushes")
         assert client.wait_for_service(timeout_sec=WAIT)
         idle = processor_ticks(program.process.pid)
-        flat = convert.flat_of(wrenches)
-        answered = client.call_async(WrenchesToTwists.Request(wrenches=flat))
+        answered = client.call_async(request)
         ros.wait(lambda: processor_ticks(program.process.pid) > idle + 10)
         assert not answered.done()
         code, output = program.end(number)
     assert code == 0, output
     assert ros.done(answered, WAIT)
     answer = answered.result()
-    # On a busy machine the signal may come before the call does, which is then refused.
+    # The node also prepares its model: on a busy machine the signal may come before the call does,
+    # which is then refused.
     assert answer.error_code in (ErrorCode.NONE, ErrorCode.UNAVAILABLE), answer.error_msg
-    whole = wrenches.size if answer.error_code == ErrorCode.NONE else 0
-    assert len(answer.twists) == whole
+    whole = PUSHES if answer.error_code == ErrorCode.NONE else 0
+    assert len(answer.outcomes) == whole
     assert "Traceback" not in output
     assert "terminate" not in output
 
