@@ -127,14 +127,15 @@ def linearise_push(
     pose, contact, given = (
         each.reshape(-1, k) for each, k in zip(arrays, (3, 2, count), strict=True)
     )
-    edge = complex(friction_edges(friction, 1)[0])
+    cone = float(np.angle(friction_edges(friction, 1)[0]))
     near = outline.nearest(contact)
     curvature = outline.curvatures(contact)
     # A vertex has no curvature: its edges' is taken.
     corner = ~(curvature < np.inf)
     at = _At(
         surface,
-        edge,
+        friction,
+        cone,
         as_complex(near.points) - complex(*about),
         -as_complex(near.normals),
         np.where(corner, 0.0, curvature),
@@ -165,10 +166,11 @@ def linearise_push(
 
 
 class _At(NamedTuple):
-    """Contacts (m,) about the reference point of a body: its surface, and an edge of the cone."""
+    """Contacts (m,) about a body's reference point; `cone` is half the friction cone [rad]."""
 
     surface: LimitSurface
-    edge: complex
+    friction: float
+    cone: float
     points: Complexes
     normals: Complexes
     curvatures: Floats
@@ -193,12 +195,11 @@ def _by_velocity(at: _At, inputs: Floats) -> _Body:
     """Return pushes with velocities along the normals and to their left, (m, 2)."""
     # Products with these numbers turn vectors from the contact's axes.
     velocities = at.normals * as_complex(inputs)
-    friction = at.edge.imag / at.edge.real if at.edge.real > 0.0 else np.inf
     found = push_derivatives(
         at.surface,
         as_vectors_of(at.points),
         as_vectors_of(at.normals),
-        friction,
+        at.friction,
         as_vectors_of(velocities),
     )
     left = 1j * at.normals
@@ -235,8 +236,8 @@ def _by_force(at: _At, inputs: Floats) -> _Body:
     twists, smooth = np.zeros((count, 3)), np.ones(count, dtype=bool)
     by_place, by_input = np.zeros((count, 4)), np.zeros((count, 4, 3))
     by_input[:, 3, 2] = 1.0
-    angles, edge = np.angle(own), float(np.angle(at.edge))
-    modes = np.where(angles > edge, SLIDE_LEFT, np.where(angles < -edge, SLIDE_RIGHT, STICK))
+    angles = np.angle(own)
+    modes = np.where(angles > at.cone, SLIDE_LEFT, np.where(angles < -at.cone, SLIDE_RIGHT, STICK))
     modes[~(own.real > 0.0)] = SEPARATE
     rows = np.flatnonzero(modes != SEPARATE)
     if len(rows):
@@ -250,7 +251,7 @@ def _by_force(at: _At, inputs: Floats) -> _Body:
         axes = np.stack([loads_at(points, normals), loads_at(points, 1j * normals)], axis=2)
         by_place[rows, :3] = np.einsum("mij,mj->mi", k, moved)
         by_input[rows, :3, :2] = k @ axes
-    full = np.full(count, edge)
+    full = np.full(count, at.cone)
     margins, _ = margins_between(angles, -full, full, modes)
     margins[own == 0.0] = 0.0
     return _Body(twists, inputs[:, 2], by_place, by_input, modes, margins, smooth)

@@ -141,7 +141,7 @@ class Derivatives(InScaledVariables):
     def is_smooth_at(self, wrench: ArrayLike) -> Bools:
         """Whether `twist_of_wrench` has a derivative at wrenches (..., 3); shape (...).
 
-        It has none at loads that a term does not see, and at the rims of facets, where the
+        It has none at loads in the null space of a term, and at the rims of facets, where the
         Jacobian is that of the inside.
         """
         array = as_rows("wrench", wrench)
