@@ -12,6 +12,8 @@ import yaml
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
 
+from limit_surface_ros.motion.linear_push import linearise_push
+from limit_surface_ros.motion.outline import Polygon
 from limit_surface_ros.nodes.ask import main
 from limit_surface_ros.nodes.decay_node import DecayNode
 from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
@@ -57,6 +59,27 @@ def test_fields_may_be_given_in_yaml_as_to_ros2(box, ask):
     assert code == 0
     wrench = planar(yaml.safe_load(answer)["wrench"]["wrench"], "force", "torque")
     np.testing.assert_allclose(wrench, box[0].surface.wrench_of_twist([1.0, 0.0, 0.5]), rtol=1e-6)
+
+
+SQUARE = "{points: [{x: -0.05, y: -0.05}, {x: 0.05, y: -0.05}, {x: 0.05, y: 0.05}, {x: -0.05, y: 0.05}]}"
+
+
+def test_lists_of_messages_may_be_given_in_yaml(box, ask):
+    fields = f"{{outline: {SQUARE}, contact: {{x: -0.05, y: 0.01}}, input: [0.02, 0.0]}}"
+    code, answer, told = ask("linearise_push", fields, "--friction", "0.3")
+    assert (code, told) == (0, "")
+    outline = Polygon([[-0.05, -0.05], [0.05, -0.05], [0.05, 0.05], [-0.05, 0.05]])
+    expected = linearise_push(
+        box[0].surface,
+        outline,
+        0.3,
+        [0.0, 0.0, 0.0],
+        [-0.05, 0.01],
+        [0.02, 0.0],
+        reference_point=box[0].reference_point,
+    )
+    found = yaml.safe_load(answer)
+    np.testing.assert_allclose(found["rates"], expected.rates, rtol=1e-6, atol=1e-12)
 
 
 def test_what_a_node_refuses_is_told_by_its_code(box, ask):
@@ -110,6 +133,9 @@ def test_a_name_that_two_nodes_have_must_be_told_apart(ros, box, ask, tmp_path):
         (["wrench_to_twist", "{sofa: 1}"], "has no field sofa; it has model, wrench"),
         (["wrench_to_twist", "{model: 1}"], "model must be of the type string, got 1"),
         (["wrench_to_twist", "{wrench: 3}"], "fields are a mapping such as {header: ...}"),
+        (["linearise_push", "{outline: {points: [{sofa: 1}]}}"], "Point32 has no field sofa"),
+        (["linearise_push", "{outline: {points: [3]}}"], "fields are a mapping such as {x: ...}"),
+        (["linearise_push", "{outline: {points: 3}}"], "points must be of the type sequence"),
         (["reload", "{model: a}"], "has no field model; it has none"),
         (["wrench_to_twist", "{"], "the fields are not YAML"),
         (["wrench_to_twist", "7"], "fields are a mapping such as"),

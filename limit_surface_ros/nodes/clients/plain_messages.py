@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import importlib
+import re
 from array import array
 from typing import TYPE_CHECKING, Any
 
@@ -50,6 +51,8 @@ def fill(message: Any, values: Mapping[str, Any]) -> None:
             continue
         try:
             setattr(message, name, _converted(current, value, fields[name]))
+        except RangeError:
+            raise
         except (AssertionError, TypeError, ValueError, OverflowError):
             raise RangeError(
                 f"{name} must be of the type {fields[name]}, got {shortened(repr(value))}"
@@ -61,6 +64,9 @@ def _converted(current: Any, value: Any, kind: str) -> Any:
     if isinstance(current, array):
         return array(current.typecode, value)
     if isinstance(current, list) and isinstance(value, list):
+        element = re.match(r"sequence<(\w+)/(\w+)", kind)
+        if element:
+            return [_filled("{}/msg/{}".format(*element.groups()), each) for each in value]
         if not all(isinstance(each, str) for each in value):
             raise TypeError
         return value
@@ -74,6 +80,13 @@ def _converted(current: Any, value: Any, kind: str) -> Any:
         if not lowest <= value < lowest + 2**bits:
             raise OverflowError
     return value
+
+
+def _filled(name: str, values: Mapping[str, Any]) -> Any:
+    """Return a message of a type, with the fields set that a mapping names."""
+    message = type_of(name)()
+    fill(message, values)
+    return message
 
 
 def plain(message: Any) -> Any:
