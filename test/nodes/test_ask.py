@@ -61,17 +61,18 @@ def test_fields_may_be_given_in_yaml_as_to_ros2(box, ask):
     np.testing.assert_allclose(wrench, box[0].surface.wrench_of_twist([1.0, 0.0, 0.5]), rtol=1e-6)
 
 
-SQUARE = "{points: [{x: -0.05, y: -0.05}, {x: 0.05, y: -0.05}, {x: 0.05, y: 0.05}, {x: -0.05, y: 0.05}]}"
+CORNERS = [[-0.05, -0.05], [0.05, -0.05], [0.05, 0.05], [-0.05, 0.05]]
 
 
 def test_lists_of_messages_may_be_given_in_yaml(box, ask):
-    fields = f"{{outline: {SQUARE}, contact: {{x: -0.05, y: 0.01}}, input: [0.02, 0.0]}}"
+    points = ", ".join(f"{{x: {x}, y: {y}}}" for x, y in CORNERS)
+    place = "contact: {x: -0.05, y: 0.01}, input: [0.02, 0.0]"
+    fields = f"{{outline: {{points: [{points}]}}, {place}}}"
     code, answer, told = ask("linearise_push", fields, "--friction", "0.3")
     assert (code, told) == (0, "")
-    outline = Polygon([[-0.05, -0.05], [0.05, -0.05], [0.05, 0.05], [-0.05, 0.05]])
     expected = linearise_push(
         box[0].surface,
-        outline,
+        Polygon(CORNERS),
         0.3,
         [0.0, 0.0, 0.0],
         [-0.05, 0.01],
