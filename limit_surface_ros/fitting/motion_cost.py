@@ -25,12 +25,13 @@ astray change the surface little (pseudo-Huber; Charbonnier et al. 1997, doi:10.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.checks import Bools, Floats
     from limit_surface_ros.fitting.pairs import ScaledPairs
 
 _ITERATIONS = 60
@@ -98,12 +99,11 @@ class MotionCost:
         log_factors = -np.log(solver.dissipation)
         cost = weights @ (log_factors**2 + self._velocity_weight * loss)
         slope *= self._velocity_weight * weights / norms
-        response = solver.adjoint(slope * (self._directions - cosines * units))
-        products = (matrices.reshape(-1, 3) @ motions).reshape(-1, 3, motions.shape[1])
-        along = np.einsum("kcn,cn->kn", products, response)
-        curvatures = (
-            -weights * log_factors / solver.dissipation - 0.5 * along / speeds**2
-        ) / speeds
+        slope = slope * (self._directions - cosines * units)
+        places = solver.response(np.einsum("cn,zcn->zn", slope, solver.frame[1:]))
+        response = places[0] * solver.frame[1] + places[1] * solver.frame[2]
+        along = np.einsum("kzn,zn->kn", solver.gradients, places)
+        curvatures = (-weights * log_factors / solver.dissipation - 0.5 * along / speeds) / speeds
         weighted = curvatures[:, None] * motions + response / speeds[:, None]
         gradient = weighted.reshape(-1, motions.shape[1]) @ motions.T
         return float(cost), gradient.reshape(-1, 3, 3)
@@ -133,123 +133,200 @@ class SmoothSupportSolver:
         units = loads / np.linalg.norm(loads, axis=0)
         least = np.zeros_like(units)
         least[np.abs(units).argmin(axis=0), np.arange(count)] = 1.0
-        first = np.cross(units, least, axis=0)
+        first = cross(units, least)
         first /= np.linalg.norm(first, axis=0)
-        second = np.cross(units, first, axis=0)
+        second = cross(units, first)
         base = loads / np.einsum("cn,cn->n", loads, loads)
         self.frame = np.stack([base, first, second])
-        # Row ij of the products turns the entries of B into v_i' B v_j.
-        sides = np.einsum("icn,jdn->ijcdn", self.frame, self.frame)[_ROWS, _COLUMNS]
-        symmetric = sides + sides.swapaxes(1, 2)
-        symmetric[:, range(3), range(3)] *= 0.5
-        self._lift = np.ascontiguousarray(
-            symmetric[:, _ROWS, _COLUMNS].transpose(1, 0, 2).reshape(6, 6 * count)
-        )
+        self._planes = _Planes.of(self.frame)
         self._place = np.zeros((2, count))
-        self._hessian = np.zeros((3, count))
+        # Place of the motions, and derivatives there, where these were asked for last.
+        nothing = np.empty((0, 2, count))
+        self._known = np.empty_like(self._place), nothing, np.empty((3, count))
 
     def begin_at(self, motions: Floats) -> None:
-        """Look for the motions of the first loads at known ones, shape (3, m)."""
+        """Look for the motions of the last loads at known ones, shape (3, m), m of 1 to n."""
         count = motions.shape[1]
-        across = self.frame[1:, :, :count]
-        self._place[:, :count] = np.einsum("zcn,cn->zn", across, motions)
+        across = self.frame[1:, :, -count:]
+        self._place[:, -count:] = np.einsum("zcn,cn->zn", across, motions)
+
+    def begin_further(self, shares: Floats) -> None:
+        """Look for the motions where another model has them, to first order.
+
+        Args:
+            shares: By which share of itself the speed of every term is larger than where
+                `gradients` were taken last, shape (k,).
+        """
+        place, gradients, hessian = self._known
+        changes = (shares @ gradients.reshape(len(shares), -1)).reshape(place.shape)
+        self._place = place + _newton_step(changes, hessian)
 
     def solve(self, matrices: Floats) -> None:
         """Find the motions under the model with these matrices, shape (k, 3, 3)."""
-        forms = (matrices[:, _ROWS, _COLUMNS] @ self._lift).reshape(len(matrices), 6, -1)
-        _descend(forms, self._place)
-        self.speeds = _speeds(forms, self._place)
+        self._entries = np.ascontiguousarray(matrices[:, _ROWS, _COLUMNS])
+        self._place = _descended(self._entries, self._planes, self._place)
+        self._point = self._planes.at(self._place)
+        self.speeds = self._point.speeds(self._entries)
         self.dissipation = self.speeds.sum(axis=0)
-        self._hessian = np.stack(_derivatives(forms, self._place, self.speeds)[1])
         base, first, second = self.frame
         self.motions = base + self._place[0] * first + self._place[1] * second
 
-    def adjoint(self, slope: Floats) -> Floats:
-        """Return u with dJ = u . d(grad D) for a cost whose gradient by the motion is `slope`.
-
-        From the condition that D be least: d(grad D) + H dv vanishes in the plane.
-
-        Args:
-            slope: dJ/dv, shape (3, n).
-
-        Returns:
-            Shape (3, n).
-        """
-        p1 = np.einsum("cn,cn->n", slope, self.frame[1])
-        p2 = np.einsum("cn,cn->n", slope, self.frame[2])
-        h11, h12, h22 = self._hessian
-        determinant = h11 * h22 - h12 * h12
-        u1 = (h12 * p2 - h22 * p1) / determinant
-        u2 = (h12 * p1 - h11 * p2) / determinant
-        return np.asarray(u1 * self.frame[1] + u2 * self.frame[2])
+    @property
+    def gradients(self) -> Floats:
+        """Gradient of every term's speed in the planes, along (z1, z2), shape (k, 2, n)."""
+        return self._derivatives[0]
 
     def response(self, changes: Floats) -> Floats:
-        """Return how the motions change with changes of grad D at them.
+        """Return how the motions change in their planes with changes of grad D in them.
+
+        From the condition that D be least: d(grad D) + H dv vanishes in the plane. H is symmetric,
+        so that this is the adjoint, too.
 
         Args:
-            changes: Shape (k, 3, n), k changes at every load.
+            changes: Along (z1, z2), shape (2, ..., n).
 
         Returns:
-            Shape (k, 3, n): -(z1 z2) H^-1 (z1 . change, z2 . change)'.
+            -H^-1 changes, shape (2, ..., n).
         """
-        p1 = np.einsum("kcn,cn->kn", changes, self.frame[1])
-        p2 = np.einsum("kcn,cn->kn", changes, self.frame[2])
-        h11, h12, h22 = self._hessian
-        determinant = h11 * h22 - h12 * h12
-        y1, y2 = (h12 * p2 - h22 * p1) / determinant, (h12 * p1 - h11 * p2) / determinant
-        return np.asarray(y1[:, None] * self.frame[1] + y2[:, None] * self.frame[2])
+        return _newton_step(changes, self._derivatives[1])
+
+    @property
+    def _derivatives(self) -> tuple[Floats, Floats]:
+        """Gradients of the terms, and Hessian of D, shape (3, n): 11, 12 and 22."""
+        place, gradients, hessian = self._known
+        if place is not self._place:
+            gradients, _, hessian = self._point.derivatives(self._entries, self.speeds)
+            self._known = self._place, gradients, hessian
+        return gradients, hessian
 
 
-def _descend(forms: Floats, places: Floats) -> None:
-    """Move `places`, shape (2, n), to the minima; loads that have arrived are left out."""
+@dataclass(frozen=True)
+class _Planes:
+    """Planes of loads in the form that solves need.
+
+    Attributes:
+        lifts: Row ij of [d, :, e] is what entry ij of B counts in d' B e, for d, e of v0, z1, z2;
+            shape (3, 6, 3, n).
+        squares: The same for z1' B z1, z1' B z2 and z2' B z2, shape (6, 3, n).
+    """
+
+    lifts: Floats
+    squares: Floats
+
+    @classmethod
+    def of(cls, frame: Floats) -> _Planes:
+        """Return those of v0, z1, z2 of each load, shape (3 vectors, 3 components, n)."""
+        rows, columns = frame[:, _ROWS], frame[:, _COLUMNS]
+        lifts = rows[:, :, None] * columns.swapaxes(0, 1)
+        lifts += columns[:, :, None] * rows.swapaxes(0, 1)
+        lifts[:, _ROWS == _COLUMNS] *= 0.5
+        squares = np.stack([lifts[1, :, 1], lifts[1, :, 2], lifts[2, :, 2]], axis=1)
+        return cls(lifts, squares)
+
+    def take(self, which: Bools) -> _Planes:
+        """Return some of them."""
+        return _Planes(self.lifts[..., which], self.squares[..., which])
+
+    def at(self, place: Floats) -> _Point:
+        """Return the motions at these places in the planes, shape (2, n)."""
+        first, second = place
+        base, along, across = self.lifts
+        sides = base + first * along + second * across
+        square = sides[:, 0] + first * sides[:, 1] + second * sides[:, 2]
+        return _Point(sides[:, 1:], square, self.squares)
+
+
+@dataclass(frozen=True)
+class _Point:
+    """A motion v in each plane.
+
+    Attributes:
+        sides: What entries of B count in z1' B v and z2' B v, shape (6, 2, n).
+        square: The same for v' B v, shape (6, n).
+        squares: See `_Planes`.
+    """
+
+    sides: Floats
+    square: Floats
+    squares: Floats
+
+    def speeds(self, entries: Floats) -> Floats:
+        """Return sqrt(v' B_k v) of matrices with these entries, shape (k, n)."""
+        return np.asarray(np.sqrt(np.maximum(entries @ self.square, 1e-300)))
+
+    def derivatives(self, entries: Floats, speeds: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return each speed's gradient in the plane, that of D, and the Hessian of D.
+
+        Their shapes are (k, 2, n), (2, n) and (3, n).
+        """
+        count = speeds.shape[1]
+        slowness = 1.0 / speeds
+        gradients = (entries @ self.sides.reshape(6, -1)).reshape(-1, 2, count)
+        gradients *= slowness[:, None]
+        total = entries.T @ slowness
+        hessian = np.einsum("cn,can->an", total, self.squares)
+        first, second = gradients[:, 0], gradients[:, 1]
+        weighted = first * slowness
+        hessian[0] -= np.einsum("kn,kn->n", weighted, first)
+        hessian[1] -= np.einsum("kn,kn->n", weighted, second)
+        hessian[2] -= np.einsum("kn,kn,kn->n", slowness, second, second)
+        return gradients, np.einsum("cn,can->an", total, self.sides), hessian
+
+
+def _newton_step(slope: Floats, hessian: Floats) -> Floats:
+    """Return -H^-1 slope for each load; shapes (2, ..., n) and (3, n)."""
+    (g1, g2), (h11, h12, h22) = slope, hessian
+    step = np.empty_like(slope)
+    step[0] = h12 * g2 - h22 * g1
+    step[1] = h12 * g1 - h11 * g2
+    step /= h11 * h22 - h12 * h12
+    return np.asarray(step)
+
+
+def cross(first: Floats, second: Floats) -> Floats:
+    """Return cross products of columns; numpy's takes several times as long for few of them."""
+    (a, b, c), (x, y, z) = first, second
+    return np.asarray(np.stack([b * z - c * y, c * x - a * z, a * y - b * x]))
+
+
+def _descended(entries: Floats, planes: _Planes, start: Floats) -> Floats:
+    """Return the minima, shape (2, n), from places to start at; arrived loads are left out."""
+    places = start.copy()
     where = np.arange(places.shape[1])
-    place = places.copy()
-    speeds = _speeds(forms, place)
+    place = places
+    point = planes.at(place)
+    speeds = point.speeds(entries)
     for _ in range(_ITERATIONS):
         total = speeds.sum(axis=0)
-        (g1, g2), (h11, h12, h22) = _derivatives(forms, place, speeds)
-        determinant = h11 * h22 - h12 * h12
-        step = np.stack([h12 * g2 - h22 * g1, h12 * g1 - h11 * g2]) / determinant
-        far = -(g1 * step[0] + g2 * step[1]) > _NEAR * total
-        place, speeds = _backtrack(forms, place, step, total)
-        places[:, where] = place
-        if not far.any():
-            return
+        _, slope, hessian = point.derivatives(entries, speeds)
+        step = _newton_step(slope, hessian)
+        far = -(slope * step).sum(axis=0) > _NEAR * total
         if not far.all():
-            where, forms = where[far], forms[:, :, far]
-            place, speeds = place[:, far], speeds[:, far]
+            # One more step is exact to rounding: there is nothing to step back from.
+            arrived = ~far
+            places[:, where[arrived]] = (place + step)[:, arrived]
+            if not far.any():
+                break
+            where, planes = where[far], planes.take(far)
+            place, step, total = place[:, far], step[:, far], total[far]
+        place, point, speeds = _backtrack(entries, planes, place, step, total)
+        places[:, where] = place
+    return np.asarray(places)
 
 
-def _backtrack(forms: Floats, place: Floats, step: Floats, total: Floats) -> tuple[Floats, Floats]:
-    """Return places along the steps where D is no larger, and the speeds there."""
+def _backtrack(
+    entries: Floats, planes: _Planes, place: Floats, step: Floats, total: Floats
+) -> tuple[Floats, _Point, Floats]:
+    """Return places along the steps where D is no larger, the motions and the speeds there."""
     for _ in range(_HALVINGS):
         trial = place + step
-        speeds = _speeds(forms, trial)
+        point = planes.at(trial)
+        speeds = point.speeds(entries)
         worse = speeds.sum(axis=0) > (1.0 + _ROUNDING) * total
         if not worse.any():
-            return trial, speeds
+            return trial, point, speeds
         step[:, worse] *= 0.5
     # Rounding: these cannot get any better.
     trial[:, worse] = place[:, worse]
-    return trial, _speeds(forms, trial)
-
-
-def _speeds(forms: Floats, place: Floats) -> Floats:
-    c00, c01, c02, c11, c12, c22 = forms.swapaxes(0, 1)
-    y1, y2 = place
-    squares = c00 + y1 * (2.0 * c01 + y1 * c11) + y2 * (2.0 * (c02 + y1 * c12) + y2 * c22)
-    return np.asarray(np.sqrt(np.maximum(squares, 1e-300)))
-
-
-def _derivatives(
-    forms: Floats, place: Floats, speeds: Floats
-) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats, Floats]]:
-    """Return gradient and Hessian of D in the plane."""
-    _, c01, c02, c11, c12, c22 = forms.swapaxes(0, 1)
-    y1, y2 = place
-    g1 = (c01 + y1 * c11 + y2 * c12) / speeds
-    g2 = (c02 + y1 * c12 + y2 * c22) / speeds
-    h11 = ((c11 - g1 * g1) / speeds).sum(axis=0)
-    h12 = ((c12 - g1 * g2) / speeds).sum(axis=0)
-    h22 = ((c22 - g2 * g2) / speeds).sum(axis=0)
-    return (g1.sum(axis=0), g2.sum(axis=0)), (h11, h12, h22)
+    point = planes.at(trial)
+    return trial, point, point.speeds(entries)

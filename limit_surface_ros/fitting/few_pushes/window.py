@@ -24,10 +24,11 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg.lapack import dposv
 
 from limit_surface_ros.fitting.few_pushes.pressure import SmallContacts
 from limit_surface_ros.fitting.few_pushes.recipe import ROBUST_SCALE
-from limit_surface_ros.fitting.motion_cost import SmoothSupportSolver, direction_loss
+from limit_surface_ros.fitting.motion_cost import SmoothSupportSolver, cross, direction_loss
 from limit_surface_ros.fitting.pairs import ScaledPairs
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 
@@ -96,7 +97,7 @@ class Window:
                     self._fit = self._challenger
                 self._challenger = None
         elif count >= _FIRST_PLACING and (count - _FIRST_PLACING) % _PLACING_EVERY == 0:
-            self._challenger = _Fit(SmallContacts.on_a_disc(pairs))
+            self._challenger = _Fit(SmallContacts.on_a_disc(pairs), self._fit.motions[:, :-1])
             self._challenged = count
             self._challenger.follow(pairs, _PLACING_STEPS)
 
@@ -144,11 +145,20 @@ class Window:
 class _Fit:
     """Friction limits of contacts that follow a window by damped Gauss-Newton steps."""
 
-    def __init__(self, usual: SmallContacts) -> None:
+    def __init__(self, usual: SmallContacts, motions: Floats | None = None) -> None:
+        """Begin with usual limits.
+
+        Args:
+            usual: Contacts with the limits n_k, all above zero.
+            motions: Of the last loads before the next one, near which those of the fit are looked
+                for, shape (3, m).
+        """
         self._usual, self._total = usual, float(usual.limits.sum())
         self._speeds = usual.speeds
         self._parameters = np.log(usual.limits)
-        self._motions = np.empty((3, 0))
+        self.motions = np.empty((3, 0)) if motions is None else motions
+        # The last load whose motion was asked for, and that motion.
+        self._predicted: tuple[Floats, Floats] | None = None
         self._damping = _DAMPING
         self.cost = math.inf
 
@@ -162,20 +172,25 @@ class _Fit:
         solver = SmoothSupportSolver(np.ascontiguousarray(load[:, None]))
         solver.solve(self._matrices(self._parameters))
         motion = solver.motions[:, 0]
+        self._predicted = load, motion
         return np.asarray(motion / np.linalg.norm(motion))
 
     def follow(self, pairs: ScaledPairs, steps: int) -> None:
         """Take steps towards the minimum over these pairs, of which one is new."""
         self._drop_idle()
-        errors = _Errors(pairs, self._motions)
+        load = pairs.wrenches[-1]
+        newest = load / (load @ load)
+        if self._predicted is not None and np.array_equal(self._predicted[0], load):
+            newest = self._predicted[1]
+        errors = _Errors(pairs, np.hstack([self.motions, newest[:, None]]))
         self.cost = self._cost(self._parameters, errors)
         equations: tuple[Floats, Floats] | None = None
         for _ in range(steps):
             if equations is None:
-                equations = self._normal_equations(errors)
+                equations = self._normal_equations(*errors.rows())
             hessian, slope = equations
-            damped = hessian + self._damping * np.eye(len(slope))
-            step = np.clip(-np.linalg.solve(damped, slope), -_FARTHEST_STEP, _FARTHEST_STEP)
+            step = _damped_step(hessian, slope, self._damping)
+            errors.begin_further(step)
             cost = self._cost(self._parameters + step, errors)
             if cost < self.cost:
                 self._parameters = self._parameters + step
@@ -184,24 +199,24 @@ class _Fit:
                 equations = None
             else:
                 self._damping *= _MORE
-        self._motions = errors.motions
+        self.motions = errors.motions
 
     def limits_without(self, pairs: ScaledPairs, parts: Sequence[Places]) -> list[Floats]:
         """Return the limits that fit all pairs but a part of them, by one Gauss-Newton step."""
-        errors = _Errors(pairs, self._motions)
+        errors = _Errors(pairs, self.motions)
         self._cost(self._parameters, errors)
-        hessian, slope = self._normal_equations(errors)
-        hessian = hessian + _LEAST_DAMPING * np.eye(len(slope))
         rows, residuals = errors.rows()
-        # Each pair has a row for its size, and three for its direction.
-        rows = rows.reshape(len(slope), 4, -1)
-        residuals = residuals.reshape(4, -1)
+        hessian, slope = self._normal_equations(rows, residuals)
+        # Each pair has a row for its size, and two for its direction.
+        rows = rows.reshape(len(slope), 3, -1)
+        residuals = residuals.reshape(3, -1)
         found = []
         for part in parts:
             its = rows[:, :, part].reshape(len(slope), -1)
             rest = hessian - its @ its.T
-            step = -np.linalg.solve(rest, slope - its @ residuals[:, part].ravel())
-            found.append(np.exp(self._parameters + np.clip(step, -_FARTHEST_STEP, _FARTHEST_STEP)))
+            missing = its @ residuals[:, part].ravel()
+            step = _damped_step(rest, slope - missing, _LEAST_DAMPING)
+            found.append(np.exp(self._parameters + step))
         return found
 
     def _drop_idle(self) -> None:
@@ -219,14 +234,27 @@ class _Fit:
         entropy = limits @ (parameters - np.log(usual)) - limits.sum() + self._total
         return errors.cost(self._matrices(parameters)) + _ENTROPY_WEIGHT * float(entropy)
 
-    def _normal_equations(self, errors: _Errors) -> tuple[Floats, Floats]:
-        """Return the Gauss-Newton Hessian and the slope, halved, where the cost was taken last."""
+    def _normal_equations(self, rows: Floats, residuals: Floats) -> tuple[Floats, Floats]:
+        """Return the Gauss-Newton Hessian and the slope, halved, where the rows were taken."""
         limits = np.exp(self._parameters)
         surprise = self._parameters - np.log(self._usual.limits)
-        rows, residuals = errors.rows()
         hessian = rows @ rows.T
         hessian[np.diag_indices_from(hessian)] += 0.5 * _ENTROPY_WEIGHT * limits
         return hessian, rows @ residuals + 0.5 * _ENTROPY_WEIGHT * limits * surprise
+
+
+def _damped_step(hessian: Floats, slope: Floats, damping: float) -> Floats:
+    """Return -(H + damping I)^-1 slope, cut to the farthest step, shape (k,).
+
+    Without a step where the matrix is not positive definite, as by rounding.
+    """
+    damped = hessian.copy()
+    damped.flat[:: len(slope) + 1] += damping
+    # Cholesky's factor takes half the time of the LU that numpy's `solve` makes.
+    _, step, not_definite = dposv(damped.T, slope, lower=1, overwrite_a=1)
+    if not_definite:
+        return np.zeros_like(slope)
+    return np.asarray(np.clip(-step, -_FARTHEST_STEP, _FARTHEST_STEP))
 
 
 class _Errors:
@@ -237,13 +265,11 @@ class _Errors:
 
         Args:
             pairs: In their order.
-            motions: Of all but the last of them, if these are known, to begin the search at; those
-                of earlier pairs may come before, shape (3, n).
+            motions: Of the last m of them, to begin the search at; those of pairs before these are
+                left out, shape (3, m).
         """
         self._solver = SmoothSupportSolver(np.ascontiguousarray(pairs.wrenches.T))
-        earlier = len(pairs) - 1
-        if 0 < earlier <= motions.shape[1]:
-            self._solver.begin_at(motions[:, motions.shape[1] - earlier :])
+        self._solver.begin_at(motions[:, -len(pairs) :])
         self._directions = np.ascontiguousarray(pairs.directions.T)
         self._weights = pairs.weights
 
@@ -264,20 +290,27 @@ class _Errors:
         loss, _ = direction_loss(cosines, ROBUST_SCALE)
         return float(self._weights @ (self._log_factors**2 + 2.0 * loss))
 
+    def begin_further(self, step: Floats) -> None:
+        """Look for the motions where a step from where `rows` were taken last leads them."""
+        self._solver.begin_further(np.expm1(step))
+
     def rows(self) -> tuple[Floats, Floats]:
         """Return slopes by the logarithms of the limits, a row for each, and the residuals."""
         solver, weights, units = self._solver, self._weights, self._units
-        # Loads of the contacts, and how each turns the motion.
-        parts = (self._matrices.reshape(-1, 3) @ solver.motions).reshape(-1, 3, len(weights))
-        parts /= solver.speeds[:, None]
-        turned = solver.response(parts) / self._norms
-        turned -= np.einsum("kcn,cn->kn", turned, units)[:, None] * units
         chords = units - self._directions
         robust = 2.0 * ROBUST_SCALE / np.sqrt(np.sum(chords**2, axis=0) + ROBUST_SCALE**2)
         of_size, of_chord = np.sqrt(weights), np.sqrt(weights * robust)
-        of_direction = (turned * of_chord).reshape(len(turned), -1)
-        rows = np.concatenate(
-            [-solver.speeds / solver.dissipation * of_size, of_direction], axis=1
-        )
-        residuals = np.concatenate([self._log_factors * of_size, (chords * of_chord).ravel()])
-        return rows, residuals
+        # Directions of error: an orthonormal basis across each unit motion.
+        across = solver.frame[1] - np.einsum("cn,cn->n", solver.frame[1], units) * units
+        across /= np.sqrt(np.einsum("cn,cn->n", across, across))
+        basis = np.stack([across, cross(units, across)])
+        # How much a change of grad D in the plane moves the unit motion along each of them.
+        first, second = solver.response(np.einsum("zcn,bcn->zbn", solver.frame[1:], basis))
+        scale = of_chord / self._norms
+        rows = np.empty((len(solver.speeds), 3, len(weights)))
+        rows[:, 0] = solver.speeds * (-of_size / solver.dissipation)
+        rows[:, 1:] = solver.gradients[:, :1] * (first * scale)
+        rows[:, 1:] += solver.gradients[:, 1:] * (second * scale)
+        chords = np.einsum("bcn,cn->bn", basis, chords) * of_chord
+        residuals = np.concatenate([self._log_factors * of_size, chords.ravel()])
+        return rows.reshape(len(rows), -1), residuals
