@@ -53,6 +53,13 @@ def planar_twist(stamped):
     return np.array([twist.linear.x, twist.linear.y, twist.angular.z])
 
 
+def handled(health, name):
+    """Return how many messages of a topic a node has accepted or refused."""
+    # A list at once: the node's thread counts meanwhile.
+    refused = list(health.refused.items())
+    return health.accepted[name] + sum(count for (where, _), count in refused if where == name)
+
+
 class Program:
     """A program of the package in a process of its own; killed if a test leaves it behind."""
 

@@ -39,7 +39,7 @@ from limit_surface_ros.nodes.messages import convert
 from limit_surface_ros.nodes.serving.answers import FiniteCheck
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.scaling import Scaling
-from node_helpers import Program, planar_twist, processor_ticks, wrench_message
+from node_helpers import Program, handled, planar_twist, processor_ticks, wrench_message
 from process_helpers import WAIT
 
 PUSHES = 100
@@ -191,17 +191,12 @@ def test_every_message_is_answered_or_counted(
     ros.wait(lambda: client_node.count_publishers(f"/limit_surface/{answered}") == 1)
     health = fuzzed.health
 
-    def handled():
-        return health.accepted[topic] + sum(
-            count for (where, _), count in health.refused.items() if where == topic
-        )
-
     @many
     @given(message=messages)
     def check(message):
-        before = handled()
+        before = handled(health, topic)
         publisher.publish(message)
-        ros.wait(lambda: handled() == before + 1)
+        ros.wait(lambda: handled(health, topic) == before + 1)
 
     check()
     assert not [code for _, code in health.refused if code == "INTERNAL"], health.last_error

@@ -33,7 +33,7 @@ from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.pairs import Pairs
 from limit_surface_ros.surface.sampling import random_loads
 from limit_surface_ros.surface.scaling import Scaling
-from node_helpers import planar_twist, twist_message, wrench_message
+from node_helpers import handled, planar_twist, twist_message, wrench_message
 
 SCALING = Scaling(0.08, 5.0)
 BODY = PointContacts([[-0.04, -0.04], [-0.04, 0.08], [0.08, -0.04]], [2.0, 1.0, 1.5], SCALING)
@@ -68,35 +68,43 @@ class Robot:
         self.time = 10.0
 
     def push(self, node, body, count, seed):
-        """Push until so many more pushes are learnt: of a lost message the push comes again."""
+        """Push until so many more pushes are learnt: for one that is not, another comes."""
         goal = node.learner.count + count
         rng = np.random.default_rng(seed)
-        for _ in range(10 * count):
-            if node.learner.count >= goal:
-                return
-            known = node.learner.count
+
+        def said():
+            return node.describe()["learning"], node.health.reported["learning"]
+
+        while node.learner.count < goal:
             pair = random_loads(body, 1, rng)
             motion = 0.02 * pair.twists[0] / np.linalg.norm(pair.twists[0] / SCALING.twist_unit)
-            for _ in range(8):
-                noisy = motion + 4e-4 * SCALING.twist_unit * rng.normal(size=3)
-                self.sample(pair.wrenches[0], noisy)
-            self.sample(np.zeros(3), np.zeros(3))
+            noise = 4e-4 * SCALING.twist_unit * rng.normal(size=(8, 3))
+            before = said()
+            self.measure(
+                node,
+                np.vstack([np.tile(pair.wrenches[0], (8, 1)), np.zeros(3)]),
+                np.vstack([motion + noise, np.zeros(3)]),
+            )
             self.time += 1.0
-            try:
-                self.ros.wait(lambda known=known: node.learner.count > known, 12.0)
-            except AssertionError:
-                continue
-        assert node.learner.count >= goal
+            self.ros.wait(lambda before=before: said() != before)
 
-    def sample(self, wrench, twist):
-        """Publish one measurement of both, at the origin of the frame."""
-        self.time += 0.01
-        stamp = Time(sec=int(self.time), nanosec=int(1e9 * (self.time % 1.0)))
+    def measure(self, node, wrenches, twists):
+        """Publish measurements at the origin of the frame; each twist finds its wrench there."""
         x, y = REFERENCE
-        fx, fy, tau = wrench
-        vx, vy, omega = twist
-        self.wrenches.publish(wrench_message((fx, fy, tau + x * fy - y * fx), stamp=stamp))
-        self.twists.publish(twist_message((vx + omega * y, vy - omega * x, omega), stamp=stamp))
+        stamps = []
+        for _ in wrenches:
+            self.time += 0.01
+            stamps.append(Time(sec=int(self.time), nanosec=int(1e9 * (self.time % 1.0))))
+        loads = [(fx, fy, tau + x * fy - y * fx) for fx, fy, tau in wrenches]
+        motions = [(vx + omega * y, vy - omega * x, omega) for vx, vy, omega in twists]
+        for name, publisher, message, vectors in (
+            ("measured_wrench", self.wrenches, wrench_message, loads),
+            ("measured_twist", self.twists, twist_message, motions),
+        ):
+            due = handled(node.health, name) + len(stamps)
+            for vector, stamp in zip(vectors, stamps, strict=True):
+                publisher.publish(message(vector, stamp=stamp))
+            self.ros.wait(lambda name=name, due=due: handled(node.health, name) == due)
 
 
 def angles(call, model, test):
@@ -196,10 +204,9 @@ def test_measurements_that_teach_nothing_do_no_harm(ros, client_node, prior):
     robot = Robot(ros, client_node)
     robot.push(node, BODY, 1, 1)
     # Not a number in the midst of a push; a twist that is late; a clock that is turned back.
-    for _ in range(4):
-        robot.sample((5.0, 0.0, 0.0), (0.02, 0.0, 0.0))
-    robot.sample((np.nan, 0.0, 0.0), (0.02, np.nan, 0.0))
-    ros.wait(lambda: node.health.refused["measured_twist", "NOT_FINITE"] == 1)
+    robot.measure(node, [(5.0, 0.0, 0.0)] * 4, [(0.02, 0.0, 0.0)] * 4)
+    robot.measure(node, [(np.nan, 0.0, 0.0)], [(0.02, np.nan, 0.0)])
+    assert node.health.refused["measured_twist", "NOT_FINITE"] == 1
     robot.twists.publish(twist_message((0.02, 0.0, 0.0), stamp=Time(sec=99)))
     ros.wait(lambda: node.health.reported["measured twist without a wrench"] == 1)
     robot.time = 1.0
