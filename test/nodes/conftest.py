@@ -47,8 +47,13 @@ class Spinner:
         self.executor = SingleThreadedExecutor(context=self.context)
         self.nodes: list = []
         self._changed = threading.Condition()
-        self._thread = threading.Thread(target=self.executor.spin)
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._spin)
         self._thread.start()
+
+    def _spin(self) -> None:
+        while not self._closing.is_set():
+            self.executor.spin_once()
 
     def add(self, make, *args, parameters=None, files=None, remap=(), namespace=None):
         """Make a node with parameters (a dict) and spin it."""
@@ -126,9 +131,13 @@ class Spinner:
         self.wait(lambda: publisher.get_subscription_count() >= count)
 
     def close(self) -> None:
-        """End the thread first: a process must not end while one spins."""
-        self.executor.shutdown()
+        """End the thread first: a process must not end while one spins.
+
+        It ends between two callbacks: rclpy's `shutdown` takes from one that runs what it needs.
+        """
+        self.executor.create_task(self._closing.set)
         self._thread.join()
+        self.executor.shutdown()
         for node in self.nodes:
             node.destroy_node()
         self.context.try_shutdown()
