@@ -12,6 +12,7 @@ import numpy as np
 from limit_surface_ros.checks import as_rows
 from limit_surface_ros.surface.gauges import scalar_jacobians
 from limit_surface_ros.surface.gauges.jacobians import (
+    ENTRIES,
     direction_jacobians,
     gradients_and_hessians,
 )
@@ -200,6 +201,6 @@ def _at_rims(kernel: Callable[[Floats], Floats], columns: Floats, still: Bools) 
 
 def _write_symmetric(six: Floats, units: Floats, out: Floats) -> None:
     """Write symmetric matrices in six rows (6, m) times their units (3, 3) into (m, 3, 3)."""
-    matrices = six[[0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(3, 3, -1)
+    matrices = six[ENTRIES]
     matrices *= units[:, :, np.newaxis]
     out.transpose(1, 2, 0)[...] = matrices

@@ -92,6 +92,33 @@ def test_loads_at_the_rim_of_a_facet_are_in_its_normal_cone(outside, count):
     assert_in_normal_cones(contacts, rim)
 
 
+@pytest.mark.parametrize("rest", [0.0, 1e-9])
+def test_in_batches_facets_and_what_is_beside_their_rims_are_told_apart(rest):
+    rng = np.random.default_rng(17)
+    contacts = random_contacts(rng, 3)
+    # With matrices nearly of rank two there is no facet, and what would be one is not exact.
+    forms = contacts.dissipation().matrices
+    surface = Dissipation(forms + rest * np.eye(3), contacts.scaling)
+    exact = contacts if rest == 0.0 else surface
+    exact.prepare()
+    x, y = np.repeat(contacts.points, 40, axis=0).T
+    turn = np.stack([y, -x, np.ones_like(x)], axis=1)
+    parts = np.tile([0.0, 0.5, 1.0 - 1e-9, 1.0, 1.0 + 1e-13, 1.0 + 1e-9, 1.0001, 1.1], 15)
+    angle = rng.uniform(0.0, 2.0 * np.pi, 120)
+    size = parts * np.repeat(contacts.friction_limits, 40)
+    fx, fy = size * np.cos(angle), size * np.sin(angle)
+    loads = contacts.wrench_of_twist(turn) + np.stack([fx, fy, x * fy - y * fx], axis=1)
+    loads *= rng.choice([-1.0, 1.0], 120)[:, np.newaxis]
+    assert_in_normal_cones(exact, loads)
+    twists = exact.twist_of_wrench(loads)
+    alone = np.array([exact.twist_of_wrench(load) for load in loads])
+    np.testing.assert_allclose(twists, alone, atol=1e-9)
+    if rest == 0.0:
+        unit = turn / np.linalg.norm(turn / contacts.scaling.twist_unit, axis=1)[:, np.newaxis]
+        across = np.abs(np.abs((twists * unit / contacts.scaling.twist_unit**2).sum(axis=1)) - 1.0)
+        assert (across[parts <= 1.0] < 1e-14).all()
+
+
 @pytest.mark.parametrize("count", [41, 101])
 def test_a_line_of_points_pulled_across_is_solved_at_its_corners(count):
     x = np.linspace(-1.0, 1.0, count)

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from limit_surface_ros.checks import Floats, Places
+    from limit_surface_ros.checks import Bools, Floats, Places
 
 # Relative width of the rim that counts as part of a cone of normals.
 RIM = 1e-12
@@ -76,6 +77,31 @@ class Corners:
             inverses @ np.moveaxis(hessians, -1, 0) @ np.swapaxes(inverses, 1, 2),
             np.zeros(len(points)) if widths is None else widths / powers,
         )
+
+    def within(self, normals: Floats) -> tuple[Bools, Places]:
+        """Tell which normals (3, m) lie within the cone of a sharp corner, and of which one.
+
+        Without a quotient: in |G_k n - c_k (n.x_k)| <= n.x_k all is linear in the normal, and one
+        product serves all corners. `nearest` costs three times as much.
+        """
+        count, columns = len(self.points), normals.shape[1]
+        parts = self._linear.dot(normals).reshape(3, count, columns)
+        np.square(parts, out=parts)
+        room = parts[2]
+        room -= parts[0]
+        room -= parts[1]
+        # The rim belongs to the cone; no two cones meet but there.
+        which = room.argmax(axis=0)
+        inside = np.maximum.reduce(room) >= 0.0
+        return inside, which
+
+    @cached_property
+    def _linear(self) -> Floats:
+        """The rows of G_k - c_k x_k', by component, and of x_k, shape (3 q, 3)."""
+        rows = self.inverses - self.centres[:, :, np.newaxis] * self.points[:, np.newaxis]
+        # Nothing is within the cone of a corner that is round.
+        along = np.where(self.widths > 0.0, 0.0, 1.0 + RIM)[:, np.newaxis] * self.points
+        return np.concatenate([rows[:, 0], rows[:, 1], along])
 
     def nearest(self, normals: Floats) -> tuple[Floats, Floats]:
         """Return how far normals lie from their nearest corner's cone, and the point to expect.

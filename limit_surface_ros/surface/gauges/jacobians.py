@@ -44,7 +44,7 @@ _LARGE = 1e120
 # One over the curvature that stands for that of a kink.
 _SOFTNESS = 1e-12
 # Rows of a symmetric matrix as entries of its six.
-_ENTRIES = [[0, 1, 2], [1, 3, 4], [2, 4, 5]]
+ENTRIES = [[0, 1, 2], [1, 3, 4], [2, 4, 5]]
 
 
 def six_of(matrices: Floats) -> Floats:
@@ -77,7 +77,7 @@ def products(six: Floats, vectors: Floats) -> Floats:
     """Return K x (3, m) for K in six rows (6, m) and x (3, m)."""
     result = np.empty_like(vectors)
     part = np.empty(vectors.shape[1])
-    for row, entries in zip(result, _ENTRIES, strict=True):
+    for row, entries in zip(result, ENTRIES, strict=True):
         np.multiply(six[entries[0]], vectors[0], out=row)
         for entry, vector in zip(entries[1:], vectors[1:], strict=True):
             np.multiply(six[entry], vector, out=part)
@@ -103,7 +103,7 @@ def direction_jacobians(
     along = products(six, unit)
     jacobians = np.empty((3, 3, normals.shape[1]))
     part = np.empty_like(scale)
-    for row, entries, component in zip(jacobians, _ENTRIES, unit, strict=True):
+    for row, entries, component in zip(jacobians, ENTRIES, unit, strict=True):
         for place, entry, of_column in zip(row, entries, along, strict=True):
             np.multiply(component, of_column, out=part)
             np.subtract(six[entry], part, out=place)
@@ -274,7 +274,7 @@ def _rest_of_flat(normals: Floats, six: Floats) -> Floats:
     found = np.empty_like(six)
     for column, (normal, entries) in enumerate(zip(normals.T, six.T, strict=True)):
         basis = np.linalg.svd(normal[np.newaxis])[2][1:]
-        values, vectors = np.linalg.eigh(basis @ entries[_ENTRIES] @ basis.T)
+        values, vectors = np.linalg.eigh(basis @ entries[ENTRIES] @ basis.T)
         inverse = 1.0 / values[1] if values[1] > 0.0 else 0.0
         vector = vectors[:, 1] @ basis
         found[:, column] = six_of((inverse * np.outer(vector, vector))[np.newaxis])[:, 0]

@@ -13,7 +13,12 @@ import numpy as np
 
 from limit_surface_ros.surface.gauges.corners import Corners
 from limit_surface_ros.surface.gauges.gauge import Turning
-from limit_surface_ros.surface.gauges.jacobians import six_of, sum_of_terms, take_outer
+from limit_surface_ros.surface.gauges.jacobians import (
+    ENTRIES,
+    six_of,
+    sum_of_terms,
+    take_outer,
+)
 from limit_surface_ros.surface.linalg import squared_lengths
 
 if TYPE_CHECKING:
@@ -157,9 +162,6 @@ class PointNormSum:
         # Velocities of the points, (2, n, 3) @ twist, and the load of unit forces at them.
         self._jacobians = np.array([[ones, zeros, -y], [zeros, ones, x]]).transpose(0, 2, 1).copy()
         self._unit_loads = limits * np.array([[ones, zeros], [zeros, ones], [-y, x]])
-        self._along_moments = limits * np.array([ones, y, y * y])
-        self._beside_moments = limits * np.array([ones, x, x * x])
-        self._cross_moments = limits * np.array([ones, x, y, x * y])
         # The six entries of each point's Hessian by its velocity's ey^2, ex^2 and ex ey / speed.
         self._turns = limits * np.array(
             [
@@ -199,39 +201,31 @@ class PointNormSum:
 
     def derivatives(self, twists: Floats, smoothing: Floats) -> tuple[Floats, Floats, Floats]:
         """Return D, its gradient and Hessian; see `Gauge`."""
+        columns = twists.shape[1]
         softness = np.square(self._reach * smoothing) if smoothing.any() else None
-        total: Floats = np.zeros(twists.shape[1])
+        total: Floats = np.zeros(columns)
         gradient: Floats = np.zeros_like(twists)
-        hessian: Floats = np.zeros((3, 3, twists.shape[1]))
-        for part in self._parts(twists.shape[1]):
-            ex, ey = self._velocities(twists, part)
-            speed = self._speeds(ex, ey, twists, softness)
-            total += self.limits[part] @ np.where(speed < np.inf, speed, 0.0)
-            slowness = np.divide(1.0, speed, out=speed)
-            ex *= slowness
-            ey *= slowness
-            gradient += self._unit_loads[:, 0, part] @ ex
-            gradient += self._unit_loads[:, 1, part] @ ey
+        hessian: Floats = np.zeros((6, columns))
+        for part in self._parts(columns):
+            velocities = (self._jacobians[:, part].reshape(-1, 3) @ twists).reshape(2, -1, columns)
+            ex, ey = velocities
+            speeds = self._speeds(ex, ey, twists, softness)
+            total += self.limits[part] @ np.where(speeds < np.inf, speeds, 0.0)
+            slowness = np.divide(1.0, speeds, out=speeds)
+            velocities *= slowness
+            gradient += self._unit_loads[:, :, part].reshape(3, -1) @ velocities.reshape(
+                -1, columns
+            )
             # A speed's Hessian is [ey^2, -ex ey; -ex ey, ex^2] / speed if nothing is smoothed.
-            weight = slowness * ex
-            across = self._cross_moments[:, part] @ (weight * ey)
-            weight *= ex
-            in_y = self._beside_moments[:, part] @ weight
-            np.multiply(slowness, ey, out=weight)
-            weight *= ey
-            in_x = self._along_moments[:, part] @ weight
+            weights = np.empty((3, *ex.shape))
+            np.multiply(ey, ey, out=weights[0])
+            np.multiply(ex, ex, out=weights[1])
+            np.multiply(ex, ey, out=weights[2])
+            weights *= slowness
             if softness is not None:
-                rounding = slowness**3 * softness
-                in_x += self._along_moments[:, part] @ rounding
-                in_y += self._beside_moments[:, part] @ rounding
-            hessian[0, 0] += in_x[0]
-            hessian[0, 1] -= across[0]
-            hessian[1, 1] += in_y[0]
-            hessian[0, 2] -= in_x[1] + across[1]
-            hessian[1, 2] += in_y[1] + across[2]
-            hessian[2, 2] += in_x[2] + 2.0 * across[3] + in_y[2]
-        hessian[1, 0], hessian[2, 0], hessian[2, 1] = hessian[0, 1], hessian[0, 2], hessian[1, 2]
-        return total, gradient, hessian
+                weights[:2] += slowness**3 * softness
+            hessian += self._turns[:, :, part].reshape(6, -1) @ weights.reshape(-1, columns)
+        return total, gradient, hessian[ENTRIES]
 
     def turning(self, twists: Floats, null: float = KINK) -> Turning:
         """Return D, its gradient and its Hessian; see `Gauge`."""

@@ -99,7 +99,8 @@ def _solver_of_norms(roots: Floats) -> SupportSolver:
     if len(roots) > FEW_TERMS:
         return Tabulated(gauge, newton)
     scalar = NormSumScalar(roots)
-    return Tabulated(gauge, SmallBatch(newton, scalar, corners), scalar=scalar)
+    small = SmallBatch(newton, scalar, corners)
+    return Tabulated(gauge, small, scalar=scalar, corners=corners)
 
 
 def points_solver(gauge: PointNormSum) -> SupportSolver:
@@ -129,4 +130,5 @@ def _solver_of_points(gauge: PointNormSum) -> SupportSolver:
     if len(gauge.limits) > FEW_TERMS:
         return Tabulated(gauge, newton)
     scalar = NormSumScalar(gauge.roots())
-    return Tabulated(gauge, SmallBatch(newton, scalar, corners), scalar=scalar)
+    small = SmallBatch(newton, scalar, corners)
+    return Tabulated(gauge, small, scalar=scalar, corners=corners)

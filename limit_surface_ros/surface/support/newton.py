@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from limit_surface_ros.errors import SolverError
+from limit_surface_ros.surface.linalg import squared_lengths
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -104,7 +105,7 @@ def plane_minimum(
         values, gradients, hessians = initial[0] * scale, initial[1], initial[2] / scale
     for _ in range(_STEPS):
         moves, slopes, sines = newton_moves(normals, basis, points, gradients, hessians)
-        lengths = np.sqrt((moves * moves).sum(axis=0) / (points * points).sum(axis=0))
+        lengths = np.sqrt(squared_lengths(moves) / squared_lengths(points))
         last = lengths <= _LAST_STEP
         angles[todo] = sines
         settled[todo] = last | (sines <= _PARALLEL)
@@ -113,15 +114,17 @@ def plane_minimum(
         # parallel; at a kink none does. Where kinks are rounded, their length alone tells.
         last &= (sines <= _PARALLEL) | (smoothing > 0.0)
         keep = ~last & (sines > _TARGET)
+        if not keep.any():
+            break
         if not keep.all():
             todo, normals, basis, smoothing, points, moves, slopes, values = kept(
                 keep, todo, normals, basis, smoothing, points, moves, slopes, values
             )
-        if len(todo) == 0:
-            break
         points, moved, values, gradients, hessians = _line_search(
             gauge, points, moves, values, slopes, smoothing
         )
+        if not moved.any():
+            break
         if not moved.all():
             todo, normals, basis, smoothing, points, values, gradients, hessians = kept(
                 moved, todo, normals, basis, smoothing, points, values, gradients, hessians
@@ -139,20 +142,22 @@ def newton_moves(
 ) -> tuple[Floats, Floats, Floats]:
     """Return Newton's moves (3, m) in the planes, slopes along them, and sines (m,)."""
     first, second = basis
-    across_first = (first * gradients).sum(axis=0)
-    across_second = (second * gradients).sum(axis=0)
-    along = (normals * gradients).sum(axis=0)
+    across_first, across_second = np.einsum("bim,im->bm", basis, gradients)
+    along = np.einsum("im,im->m", normals, gradients)
     rising = along > 0.0
-    sines = np.hypot(across_first, across_second) / np.where(rising, along, 1.0)
+    across = np.sqrt(across_first * across_first + across_second * across_second)
+    sines = across / np.where(rising, along, 1.0)
     sines[~rising] = np.inf
     by_first = np.einsum("ijm,jm->im", hessians, first)
     by_second = np.einsum("ijm,jm->im", hessians, second)
-    a = (first * by_first).sum(axis=0)
-    b = (first * by_second).sum(axis=0)
-    c = (second * by_second).sum(axis=0)
+    a = np.einsum("im,im->m", first, by_first)
+    b = np.einsum("im,im->m", first, by_second)
+    c = np.einsum("im,im->m", second, by_second)
     # Where the gauge is flat the answer is not unique and any step will do.
-    size = np.sqrt((gradients * gradients).sum(axis=0) / (points * points).sum(axis=0))
-    mean, spread = 0.5 * (a + c), np.hypot(0.5 * (a - c), b)
+    squares = squared_lengths(points)
+    size = np.sqrt(squared_lengths(gradients) / squares)
+    mean, half = 0.5 * (a + c), 0.5 * (a - c)
+    spread = np.sqrt(half * half + b * b)
     ridge = 1e-15 * spread + 1e-13 * size
     # Negative curvature is replaced by its absolute value (modified Newton).
     negative = np.flatnonzero(mean < spread * (1.0 - 1e-10))
@@ -165,11 +170,13 @@ def newton_moves(
     determinant = np.maximum(a * c - b * b, ridge * (a + c))
     p = (b * across_second - c * across_first) / determinant
     q = (b * across_first - a * across_second) / determinant
-    length = np.hypot(p, q)
-    reach = np.sqrt((points * points).sum(axis=0))
-    shrink = np.where(length > reach, reach / np.where(length > 0.0, length, 1.0), 1.0)
-    p *= shrink
-    q *= shrink
+    length = np.sqrt(p * p + q * q)
+    reach = np.sqrt(squares)
+    long = length > reach
+    if long.any():
+        shrink = np.where(long, reach / np.where(long, length, 1.0), 1.0)
+        p *= shrink
+        q *= shrink
     return p * first + q * second, p * across_first + q * across_second, sines
 
 

@@ -77,7 +77,8 @@ def power_sum_solver(roots: Floats, exponents: Floats) -> SupportSolver:
 def _convex_solver(gauge: NormSum | PowerSumGauge, scalar: ScalarGauge) -> SupportSolver:
     corners = gauge.corners()
     newton = ConvexNewton(gauge, even_directions(_CONVEX_STARTS).T, corners)
-    return Tabulated(gauge, SmallBatch(newton, scalar, corners), scalar=scalar)
+    small = SmallBatch(newton, scalar, corners)
+    return Tabulated(gauge, small, scalar=scalar, corners=corners)
 
 
 class Ellipsoid(SupportSolver):

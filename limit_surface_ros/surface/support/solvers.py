@@ -19,13 +19,15 @@ from limit_surface_ros.surface.linalg import even_directions, of_unit_length
 from limit_surface_ros.surface.support.newton import certain_minimum, plane_minimum
 
 if TYPE_CHECKING:
-    from limit_surface_ros.checks import Bools, Floats, Places
+    from limit_surface_ros.checks import Floats, Places
     from limit_surface_ros.surface.gauges.corners import Corners
     from limit_surface_ros.surface.gauges.gauge import Gauge, Vector
 
 # Neighbours of a start among which it must be best to be a peak.
 _NEIGHBOURS = 8
-# Distance from a corner's cone, in its radii, up to which the start beside it may be the better.
+# Distance from a corner's cone, in its radii, up to which the start beside it is the best one, and
+# up to which it may be.
+_CLOSE = 1.2
 _BESIDE = 4.0
 # Vectors whose table stays in the processor's cache.
 _TABLE_COLUMNS = 200
@@ -89,37 +91,56 @@ class ConvexNewton(StartedSolver):
         """Return what `solve` does, with other corners: those that may be near to the answers."""
         units = of_unit_length(normals)
         if corners is None:
-            points = self._descend(units)
+            starts = np.ones(units.shape[1]), *self.starts(units)
+            points = self._descend(units, starts)
         else:
             distance, points = corners.nearest(units)
             smooth = np.flatnonzero(distance > 1.0)
             if len(smooth):
-                near = points.take(smooth, axis=1)
-                beside = distance[smooth] < _BESIDE
-                points[:, smooth] = self._descend(units.take(smooth, axis=1), near, beside)
+                some, near = units.take(smooth, axis=1), points.take(smooth, axis=1)
+                starts = self._starts_beside(some, near, distance[smooth])
+                points[:, smooth] = self._descend(some, starts)
         points /= self._gauge.values(points)
         return points, (normals * points).sum(axis=0)
 
-    def _descend(
-        self, units: Floats, near: Floats | None = None, beside: Bools | None = None
-    ) -> Floats:
-        """Return the support points for unit vectors (3, m), from the better of two starts.
+    def _descend(self, units: Floats, starts: tuple[Floats, Floats, Floats, Floats]) -> Floats:
+        """Return the support points for unit vectors (3, m), from values, points and so on."""
+        values, points, gradients, hessians = starts
+        return certain_minimum(self._gauge, units, points, (values, gradients, hessians))
+
+    def _starts_beside(
+        self, units: Floats, near: Floats, distance: Floats
+    ) -> tuple[Floats, Floats, Floats, Floats]:
+        """Return values, points (3, m), gradients and Hessians (3, 3, m) of the better starts.
 
         Args:
-            units: The vectors.
+            units: Unit vectors (3, m).
             near: Points (3, m) by the corners nearest to them.
-            beside: Where these are worth a look, (m,).
+            distance: From the cones of these, in their radii, (m,).
         """
-        points, gradients, hessians = self.starts(units)
-        values = np.ones(units.shape[1])
-        if near is not None and beside is not None:
-            near = near / self._gauge.values(near)
-            better = (units * near).sum(axis=0) > (units * points).sum(axis=0)
-            place = np.flatnonzero(beside & better)
-            points[:, place] = near = near.take(place, axis=1)
-            found = self._gauge.derivatives(near, np.zeros(len(place)))
-            values[place], gradients[:, place], hessians[:, :, place] = found
-        return certain_minimum(self._gauge, units, points, (values, gradients, hessians))
+        points = near / self._gauge.values(near)
+        far = np.flatnonzero(distance > _CLOSE)
+        if len(far) == 0:
+            values, gradients, hessians = self._gauge.derivatives(points, np.zeros(len(distance)))
+            return values, points, gradients, hessians
+        wanted, others = units.take(far, axis=1), self.starts(units.take(far, axis=1))
+        better = np.einsum("im,im->m", wanted, points.take(far, axis=1)) > np.einsum(
+            "im,im->m", wanted, others[0]
+        )
+        left = np.flatnonzero(~(better & (distance[far] < _BESIDE)))
+        place = far[left]
+        beside = np.ones(len(distance), dtype=bool)
+        beside[place] = False
+        values = np.ones(len(distance))
+        gradients, hessians = np.empty_like(points), np.empty((3, 3, len(distance)))
+        at = np.flatnonzero(beside)
+        if len(at):
+            values[at], gradients[:, at], hessians[:, :, at] = self._gauge.derivatives(
+                points.take(at, axis=1), np.zeros(len(at))
+            )
+        for array, other in zip((points, gradients, hessians), others, strict=True):
+            array[..., place] = other.take(left, axis=-1)
+        return values, points, gradients, hessians
 
     def starts(self, normals: Floats) -> tuple[Floats, Floats, Floats]:
         """Return starts (3, m) for vectors (3, m), with their gradients and Hessians (3, 3, m)."""

@@ -38,6 +38,8 @@ _ORDERS = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
 SAMPLES = (2 * CELLS + 1) ** 2
 # Steps along the curvature until a point counts as hard.
 STEPS = 6
+# Share of the columns below which those that do not settle soon, as beside a kink, are left.
+_FEW_LEFT = 0.04
 # Lengths in the chart of steps that prove a point in any cell, and in none.
 _SHORT_STEP, _LONG_STEP = 1e-10, 1e-5
 # Between these a step is the last if it leaves errors below these: in the chart, which is the part
@@ -153,6 +155,9 @@ class SupportTable:
             # Or the step before has left so little that this one leaves nothing.
             done |= (away <= NEAR) & (MORE * away * away <= STEP_ERROR * before)
             certain[todo] = done
+            few = len(todo) < _FEW_LEFT * len(certain) and 2 * np.count_nonzero(done) < len(todo)
+            if few:
+                break
             todo, before = todo[~done], away[~done]
         return points, certain
 

@@ -19,9 +19,12 @@ from limit_surface_ros.surface.support.table import SAMPLES, SupportTable
 from limit_surface_ros.surface.support.table_scalar import TableScalar
 
 if TYPE_CHECKING:
-    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.checks import Bools, Floats, Places
+    from limit_surface_ros.surface.gauges.corners import Corners
     from limit_surface_ros.surface.gauges.gauge import FirstOrder, ScalarGauge, Vector
 
+# Corners up to which a look at all cones comes before the table.
+_FEW_CORNERS = 6
 # A table pays for a batch of so many times the vectors that are solved to make it.
 _PAYS = 1.3
 
@@ -35,6 +38,7 @@ class Tabulated(SupportSolver):
         solver: SupportSolver,
         *,
         scalar: ScalarGauge | None = None,
+        corners: Corners | None = None,
         convex: bool = True,
         ahead: bool = True,
     ) -> None:
@@ -44,6 +48,7 @@ class Tabulated(SupportSolver):
             gauge: Of the surface g = 1.
             solver: For its support points.
             scalar: The gauge for one point, if plain floats are quicker.
+            corners: Of the surface, if it has any.
             convex: Whether a point with the wanted normal is the answer for that alone.
             ahead: Whether a table is worth its time before any large batch is there.
         """
@@ -54,6 +59,10 @@ class Tabulated(SupportSolver):
         self._scalar = scalar
         self._table: SupportTable | None = None
         self._one: TableScalar | None = None
+        self._corners = None
+        if corners is not None and len(corners.points) <= _FEW_CORNERS:
+            self._corners = corners
+            self._at_corners = corners.points.T / gauge.values_and_normals(corners.points.T)[0]
 
     def solve(self, normals: Floats) -> tuple[Floats, Floats]:
         """Return support points and powers; see `SupportSolver`."""
@@ -63,6 +72,28 @@ class Tabulated(SupportSolver):
             return self._solver.solve(normals)
         if self._one is not None and normals.shape[1] <= FEW:
             return one_by_one(self, self._solver, normals)
+        if self._corners is not None:
+            inside, which = self._corners.within(normals)
+            if inside.any():
+                return self._beside_corners(table, normals, inside, which)
+        return self._from_table(table, normals)
+
+    def _beside_corners(
+        self, table: SupportTable, normals: Floats, inside: Bools, which: Places
+    ) -> tuple[Floats, Floats]:
+        """Return what `solve` does where some normals are in the cones of corners."""
+        points = self._at_corners.take(which, axis=1)
+        power = np.einsum("im,im->m", normals, points)
+        points *= np.copysign(1.0, power)
+        np.abs(power, out=power)
+        rest = np.flatnonzero(~inside)
+        if len(rest):
+            found = self._from_table(table, normals.take(rest, axis=1))
+            points[:, rest], power[rest] = found
+        return points, power
+
+    def _from_table(self, table: SupportTable, normals: Floats) -> tuple[Floats, Floats]:
+        """Return support points and powers, from the table where that is certain."""
         points, certain = table.points(normals)
         hard = np.flatnonzero(~certain)
         if len(hard):
