@@ -24,10 +24,12 @@ from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.linalg import root_of
 
 if TYPE_CHECKING:
-    from limit_surface_ros.checks import Complexes, Floats
+    from limit_surface_ros.checks import Bools, Complexes, Floats
     from limit_surface_ros.surface.base import LimitSurface
 
 
+# Form of a force, in parts of the largest, below which a norm may be at its kink.
+_CORNER = 1e-12
 # Angle [rad] over which differences are taken where no derivative is known.
 _STEP = 1e-5
 
@@ -46,6 +48,10 @@ class PlaneSection(Protocol):
 
     def guess(self, contacts: Floats, wanted: Floats) -> Floats:
         """Return angles (m,) near those of the forces that cause velocities at given angles."""
+        ...
+
+    def in_corners(self, contacts: Floats, angles: Floats) -> Bools:
+        """Tell near which contacts' forces at angles (m,), left or right, a corner may be."""
         ...
 
     def respond(self, contacts: Floats, angles: Floats) -> tuple[Floats, Floats, Floats]:
@@ -120,6 +126,18 @@ class _NormSection:
         u = np.exp(1j * wanted)
         return np.asarray(np.angle(total * u - turned * np.conj(u)))
 
+    def in_corners(self, contacts: Floats, angles: Floats) -> Bools:
+        """See `PlaneSection`; a norm is all but zero there."""
+        axis, largest, least, _, _ = contacts.reshape(5, self._terms, -1)
+        near = np.zeros(len(angles), dtype=bool)
+        rows = np.flatnonzero((least <= _CORNER * largest).any(axis=0))
+        if len(rows):
+            axis, largest, least = (each.take(rows, axis=1) for each in (axis, largest, least))
+            for turn in (angles[rows] - axis, -angles[rows] - axis):
+                square = largest * np.cos(turn) ** 2 + least
+                near[rows] |= (square <= _CORNER * largest).any(axis=0)
+        return near
+
     def respond(self, contacts: Floats, angles: Floats) -> tuple[Floats, Floats, Floats]:
         """See `PlaneSection`."""
         axis, largest, least, less, determinant = contacts.reshape(5, self._terms, -1)
@@ -190,6 +208,10 @@ class _QuarticSection:
         n, t = np.sqrt(contacts[0]), np.sqrt(contacts[4])
         return np.asarray(np.arctan2(np.sin(wanted) * n, np.cos(wanted) * t))
 
+    def in_corners(self, contacts: Floats, angles: Floats) -> Bools:
+        """See `PlaneSection`; none is known."""
+        return np.zeros(len(angles), dtype=bool)
+
     def respond(self, contacts: Floats, angles: Floats) -> tuple[Floats, Floats, Floats]:
         """See `PlaneSection`."""
         e0, e1, e2, e3, e4 = contacts
@@ -220,6 +242,10 @@ class _AnySection:
     def guess(self, contacts: Floats, wanted: Floats) -> Floats:
         """Return the answer for a body that follows a force."""
         return wanted
+
+    def in_corners(self, contacts: Floats, angles: Floats) -> Bools:
+        """See `PlaneSection`; none is known."""
+        return np.zeros(len(angles), dtype=bool)
 
     def respond(self, contacts: Floats, angles: Floats) -> tuple[Floats, Floats, Floats]:
         """See `PlaneSection`."""

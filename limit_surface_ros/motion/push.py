@@ -99,16 +99,8 @@ def push(
         return Push(np.zeros(3), ContactMode.SEPARATE, np.zeros(3))
     # The velocity's size is taken out, so that nothing overflows or vanishes on the way.
     speed = hypot(*pushed)
-    direction = pushed[0] / speed, pushed[1] / speed
-    if surface.wrench_is_closed:
-        found = contact.stick_by_turning(surface, direction)
-    else:
-        found = contact.stick_by_force(direction)
-    if isinstance(found, Push):
-        return Push(speed * found.twist, found.mode, found.wrench)
-    edge, mode = found
-    factor = approach / product(edge.velocity, contact.normal)
-    return Push(factor * edge.twist, mode, contact.wrench(edge.force, edge.twist))
+    found = contact.push((pushed[0] / speed, pushed[1] / speed))
+    return Push(speed * found.twist, found.mode, found.wrench)
 
 
 def pushes(

@@ -9,11 +9,13 @@ product and the cross product.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from limit_surface_ros.motion.contact_sections import LineSection, PlaneSection, plane_section
+from limit_surface_ros.motion.outcomes import MODES
 from limit_surface_ros.motion.push_roots import (
     EXACT,
     SLIDE_LEFT,
@@ -22,15 +24,15 @@ from limit_surface_ros.motion.push_roots import (
     force_angles,
     turning_rates,
 )
+from limit_surface_ros.motion.push_scalar import ContactScalar
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Bools, Complexes, Floats, Places
+    from limit_surface_ros.motion.outcomes import Push
     from limit_surface_ros.surface.base import LimitSurface
 
 # Angle [rad] from a corner beyond which the surface's own map is surely past its kink.
 _ROUNDING = 1e-12
-# Angle [rad] from an edge of the friction cone within which a force is as good as there.
-_AT_EDGE = 4e-15
 # Turning rate, in parts of its unit, that sets a resting support point in motion.
 _REST = 1e-13
 # The side to which pushers of each mode slide.
@@ -130,62 +132,36 @@ class PushBatch:
                 first = np.where(new, section.guess(data, wanted), starts)
         limit = np.angle(contacts.edges)
         low, high, modes = force_angles(section, data, limit, wanted, first, exact)
-        lower, upper = self._settle_edges(contacts, wanted, limit, low, high, modes)
         jumps = np.flatnonzero((low < high) & (modes == STICK))
         if len(jumps):
             # The surface's own map takes what is close for the corner: both sides must be met.
             low[jumps] -= _ROUNDING
             high[jumps] += _ROUNDING
-        twists, loads = self._caused(contacts, low, lower, wrenches)
+        twists, loads = self._caused(contacts, low, modes, wrenches)
         if len(jumps):
             some = contacts.take(jumps)
-            more, more_loads = self._caused(some, high[jumps], upper[jumps], wrenches)
+            more, more_loads = self._caused(some, high[jumps], modes[jumps], wrenches)
             _mix(some, twists, loads, jumps, more, more_loads)
+        # Where an edge of the friction cone lies in a corner the section and the surface's own map
+        # may find two of the many velocities there: what is so rare is solved one by one.
+        for row in np.flatnonzero(section.in_corners(data, limit)).tolist():
+            alone = self._alone(contacts, row)
+            twists[row], modes[row] = alone.twist, MODES.index(alone.mode)
+            if loads is not None:
+                loads[row] = alone.wrench
         _follow(contacts, twists, modes)
         return Answers(twists, modes, loads, low)
 
-    def _settle_edges(
-        self,
-        contacts: Contacts,
-        wanted: Floats,
-        limit: Floats,
-        low: Floats,
-        high: Floats,
-        modes: Places,
-    ) -> tuple[Places, Places]:
-        """Correct in place what was found at the edges of friction cones.
-
-        Where an edge lies in a corner of the surface its velocity is any of a range, of which
-        the section finds another than the surface's own map: the latter decides, as in `push`.
-
-        Returns:
-            At which edge the forces at both ends of each bracket are, as the mode that slides
-            along it; STICK where at none.
-        """
-        lower, upper = modes.copy(), modes.copy()
-        outer = np.where(np.abs(low) > np.abs(high), low, high)
-        rows = np.flatnonzero((modes != STICK) | (np.abs(outer) >= limit - _AT_EDGE))
-        if not len(rows):
-            return lower, upper
-        some, most, side = contacts.take(rows), limit[rows], _SIDES[modes[rows]]
-        side = np.where(side == 0.0, np.where(outer[rows] < 0.0, -1.0, 1.0), side)
-        edge = np.where(side > 0.0, SLIDE_LEFT, SLIDE_RIGHT)
-        twists, _ = self._caused(some, np.zeros(len(rows)), edge, False)
-        moved = np.conj(some.normals) * contact_velocities(some.points, twists)
-        forces = some.edges.real + 1j * side * some.edges.imag
-        error = side * most + np.angle(np.conj(forces) * moved) - wanted[rows]
-        # A cone without a width has both edges in one.
-        bare = most == 0.0
-        edge = np.where(bare, np.where(error < 0.0, SLIDE_LEFT, SLIDE_RIGHT), edge)
-        slides = np.where(bare, np.abs(error), -side * error) > EXACT
-        modes[rows] = np.where(slides, edge, STICK)
-        left, right = side > 0.0, side < 0.0
-        sticks = ~slides & ~bare
-        low[rows] = np.where(right | ~sticks, side * most, np.minimum(low[rows], most - _AT_EDGE))
-        high[rows] = np.where(left | ~sticks, side * most, np.maximum(high[rows], _AT_EDGE - most))
-        lower[rows] = np.where(left & sticks, STICK, edge)
-        upper[rows] = np.where(right & sticks, STICK, edge)
-        return lower, upper
+    def _alone(self, contacts: Contacts, row: int) -> Push:
+        """Return what one of the pushes does, from the maps for one vector."""
+        point, normal, edge, velocity = (complex(each[row]) for each in contacts)
+        contact = ContactScalar(
+            self._surface,
+            (point.real, point.imag),
+            (normal.real, normal.imag),
+            edge.imag / edge.real if edge.real > 0.0 else math.inf,
+        )
+        return contact.push((velocity.real, velocity.imag))
 
     def _caused(
         self, contacts: Contacts, angles: Floats, modes: Places, wrenches: bool

@@ -26,6 +26,8 @@ _WIDTH = 4e-16
 _EXACT = 4e-15
 # Product of two such errors between which what is straight in them is as good.
 _STRAIGHT = 1e-28
+# Angle [rad] from an edge of the friction cone in a corner that is surely beyond the corner.
+_BEYOND = 1e-11
 # A body that turns freely about its contact needs no turning rate, however large.
 _DOUBLINGS = 60
 _INFINITY = float("inf")
@@ -66,9 +68,33 @@ class ContactScalar:
         self._along = 1.0 / hypot(1.0, friction)
         self._across = friction * self._along if friction < _INFINITY else 1.0
 
+    def push(self, velocity: _Pair) -> Push:
+        """Return what a pusher with a unit velocity, of which a part is along the normal, does."""
+        if self._surface.wrench_is_closed:
+            found = self.stick_by_turning(self._surface, velocity)
+        else:
+            found = self.stick_by_force(velocity)
+        if isinstance(found, Push):
+            return found
+        edge, mode = found
+        factor = product(velocity, self.normal) / product(edge.velocity, self.normal)
+        return Push(factor * edge.twist, mode, self.wrench(edge.force, edge.twist))
+
     def edge(self, side: float) -> Response:
-        """Return what the force along the left (1) or right (-1) edge of the cone causes."""
-        return self._respond(self._along, side * self._across)
+        """Return what the force along the left (1) or right (-1) edge of the cone causes.
+
+        Where the edge lies in a corner of the surface that is any motion of a cone. The pusher
+        sticks wherever a force within the friction cone, or at its edge, lets it: of these
+        motions the one that is the farthest to the edge's side counts, which a force just beyond
+        the edge causes.
+        """
+        along, across = self._along, side * self._across
+        response = self._respond(along, across)
+        if self._surface.may_have_corners and self._is_in_corner(response.force):
+            turned = side * _BEYOND
+            beyond = self._respond(along - turned * across, across + turned * along)
+            return Response(response.force, beyond.twist, beyond.velocity)
+        return response
 
     def stick_by_force(self, velocity: _Pair) -> _Outcome:
         """Find the force within the cone for which the body follows the pusher.
@@ -78,32 +104,38 @@ class ContactScalar:
         """
         wanted = atan2(turn(self.normal, velocity), product(self.normal, velocity))
         limit = atan2(self._across, self._along)
-        responses: dict[float, Response] = {}
+
+        def error_of(angle: float, response: Response) -> float:
+            # Friction takes power: velocity and force are less than 90 deg apart.
+            force, _, caused = response
+            return angle + atan2(turn(force, caused), product(force, caused)) - wanted
+
+        edges: dict[float, Response] = {}
+        # The side to which the pusher moves is the likelier to slide.
+        for side in (1.0, -1.0) if wanted > 0.0 else (-1.0, 1.0):
+            edges[side] = self.edge(side)
+            if side * error_of(side * limit, edges[side]) < -_EXACT:
+                mode = ContactMode.SLIDE_LEFT if side > 0.0 else ContactMode.SLIDE_RIGHT
+                return edges[side], mode
+        responses = {-limit: edges[-1.0], limit: edges[1.0]}
 
         def error(angle: float) -> float:
             if angle not in responses:
-                if abs(angle) < limit:
-                    responses[angle] = self._respond(cos(angle), sin(angle))
-                else:
-                    responses[angle] = self.edge(1.0 if angle > 0.0 else -1.0)
-            force, _, caused = responses[angle]
-            # Friction takes power: velocity and force are less than 90 deg apart.
-            return angle + atan2(turn(force, caused), product(force, caused)) - wanted
+                responses[angle] = self._respond(cos(angle), sin(angle))
+            return error_of(angle, responses[angle])
 
-        # The side to which the pusher moves is the likelier to slide.
-        for side in (1.0, -1.0) if wanted > 0.0 else (-1.0, 1.0):
-            if side * error(side * limit) < -_EXACT:
-                mode = ContactMode.SLIDE_LEFT if side > 0.0 else ContactMode.SLIDE_RIGHT
-                return responses[side * limit], mode
-        low, high = root_bracket(error, -limit, limit, _WIDTH, _EXACT, _STRAIGHT)
-        below, above = max(0.0, -error(low)), max(0.0, error(high))
-        twist, force = responses[low].twist, responses[low].force
-        if low < high and below + above > 0.0:
+        low, high, right, left = -limit, limit, edges[-1.0], edges[1.0]
+        if limit > 0.0:
+            low, high = root_bracket(error, low, high, _WIDTH, _EXACT, _STRAIGHT)
+            right, left = responses[low], responses[high]
+        below, above = max(0.0, -error_of(low, right)), max(0.0, error_of(high, left))
+        twist, force = right.twist, right.force
+        if right is not left and below + above > 0.0:
             # Unit velocities weigh as the sines of the angles that they are off.
-            first = sin(above) / hypot(*responses[low].velocity)
-            second = sin(below) / hypot(*responses[high].velocity)
-            twist = first * twist + second * responses[high].twist
-            part, (ax, ay), (bx, by) = second / (first + second), force, responses[high].force
+            first = sin(above) / hypot(*right.velocity)
+            second = sin(below) / hypot(*left.velocity)
+            twist = first * twist + second * left.twist
+            part, (ax, ay), (bx, by) = second / (first + second), force, left.force
             force = ax + part * (bx - ax), ay + part * (by - ay)
         wrench = self.wrench(force, twist)
         caused = self._velocity(twist)
@@ -187,6 +219,16 @@ class ContactScalar:
         force = along * nx - across * ny, along * ny + across * nx
         twist = self._surface.twist_of_wrench(self._load(force))
         return Response(force, twist, self._velocity(twist))
+
+    def _is_in_corner(self, force: _Pair) -> bool:
+        """Tell whether the maps for one vector leave the load of a force, as they do at kinks."""
+        fx, fy, torque = self._load(force)
+        length, unit = (
+            self._surface.scaling.characteristic_length,
+            self._surface.scaling.friction_force,
+        )
+        load = fx / unit, fy / unit, torque / (unit * length)
+        return self._surface.shape.load_factor_and_motion_scalar(load) is None
 
     def _velocity(self, twist: Floats) -> _Pair:
         vx, vy, omega = twist.tolist()

@@ -113,6 +113,11 @@ class LimitSurface(Derivatives):
         return None
 
     @property
+    def may_have_corners(self) -> bool:
+        """Whether a load factor in closed form may have corners, whose twists fill a cone."""
+        return False
+
+    @property
     def scaled_forms(self) -> Floats | None:
         """The B_k (k, 3, 3) of a dissipation sum_k sqrt(v' B_k v), if the surface has one."""
         return None

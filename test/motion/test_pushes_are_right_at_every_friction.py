@@ -255,6 +255,35 @@ def test_pushes_whose_friction_cone_ends_in_a_corner_are_right(rank, friction):
         for row in range(24):
             alone = push(surface, point, [1.0, 0.0], friction, velocities[row])
             assert alone.mode is found[row].mode
+        # Where sticking is possible, be it at the edge of the cone alone, the pusher sticks.
+        sides = [1.0, -1.0] if friction > 0.0 else [side, side]
+        left, right = (
+            velocity_angles(point, complex(x, y if each == side else -y), rows) for each in sides
+        )
+        expected = np.where(angles > left.max(), LEFT, STICK)
+        expected[angles < right.min()] = RIGHT
+        np.testing.assert_array_equal(found.modes, expected)
+
+
+def velocity_angles(point, force, rows):
+    """Return angles from (1, 0) of velocities at a contact that a force causes.
+
+    Of the body |rows w| + |w| = 1 in scaled variables; at a corner the first norm has gradients
+    rows' y with |y| <= 1, of which those on the rim are sampled.
+    """
+    x, y = point / SCALING.characteristic_length
+    load = np.array([force.real, force.imag, x * force.imag - y * force.real])
+    norm = np.linalg.norm(rows @ load)
+    if norm > 1e-12:
+        ys = (rows @ load)[np.newaxis] / norm
+    elif len(rows) == 1:
+        ys = np.array([[1.0], [-1.0]])
+    else:
+        turn = np.linspace(0.0, 2.0 * np.pi, 100001)
+        ys = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    vx, vy, omega = (load / np.linalg.norm(load) + ys @ rows).T
+    moved = vx - omega * y + 1j * (vy + omega * x)
+    return np.angle(force) + np.angle(np.conj(force) * moved)
 
 
 def test_no_pushes_are_no_answers_and_leaving_is_told():

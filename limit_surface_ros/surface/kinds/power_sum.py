@@ -189,6 +189,12 @@ class PowerSum(LimitSurface):
         return None
 
     @cached_property
+    def may_have_corners(self) -> bool:
+        """Whether a norm resists no load at all along some line; see `LimitSurface`."""
+        ranks = self._roots.any(axis=2).sum(axis=1)
+        return bool(((ranks < 3) & (self.exponents <= 0.5)).any())
+
+    @cached_property
     def _roots(self) -> Floats:
         """The R_i with R_i' R_i = A_i: they keep twice the digits where a form is small."""
         return np.array([root_of(matrix) for matrix in self.matrices])
