@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 from limit_surface_ros.decay.fit import METHODS, fit_decay
 from limit_surface_ros.decay.targets import Record
 from limit_surface_ros.errors import LimitSurfaceError, RangeError
+from limit_surface_ros.tools.common.decay_fit import add_method_options, beyond, method_options
 from limit_surface_ros.tools.common.decay_input import add_input_options, read_input
 from limit_surface_ros.tools.common.program import program_parser, progress_bar, run_program
-from limit_surface_ros.tools.fit_decay import add_method_options, beyond, method_options
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

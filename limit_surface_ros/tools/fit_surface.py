@@ -49,8 +49,6 @@ EXAMPLES = """examples:
   fit_surface pushes.mcap --wrench-topic wrench --motion-topic pose --auto --output model.yaml
 """
 
-# What pushes of a calibration are.
-PARTS = {"cross-validation": CALIBRATION, "held out": HELD_OUT_CALIBRATION}
 # Costs closer than this differ by rounding.
 NO_COST = 1e-12
 

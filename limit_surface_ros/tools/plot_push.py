@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -19,10 +18,13 @@ from limit_surface_ros.motion.rollout import DEFAULT_ACCURACY, OVERLAPS, simulat
 from limit_surface_ros.motion.spread import push_spread
 from limit_surface_ros.plots.canvas import save_figure
 from limit_surface_ros.plots.push_view import draw_push, write_film
-from limit_surface_ros.tools.common.options import (
+from limit_surface_ros.tools.common.motion_options import (
     add_motion_options,
-    add_picture_options,
     check_film,
+    pose_in_words,
+)
+from limit_surface_ros.tools.common.options import (
+    add_picture_options,
     check_picture,
     check_ranges,
 )
@@ -32,7 +34,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from limit_surface_ros.checks import Floats
+    from limit_surface_ros.motion.outcomes import PushRun
     from limit_surface_ros.motion.outline import Outline
+    from limit_surface_ros.motion.spread import EndPoses
     from limit_surface_ros.surface.base import LimitSurface
     from limit_surface_ros.surface.kinds.dissipation_scatter import UncertainSurface
 
@@ -139,6 +143,27 @@ def default_path(outline: Outline, pose: Floats, radius: float) -> Floats:
     return np.array([[begin, height], [end, height]])
 
 
+def report(name: str, found: PushRun, ends: EndPoses | None) -> None:
+    """Print how a push goes, and how far an ensemble's ends lie apart."""
+    print(f"body        {name}")
+    touched = "never" if found.touched_at is None else f"after {1e3 * found.touched_at:.3f} mm"
+    print(f"touched     {touched}")
+    if found.left_at is not None:
+        print(f"left        after {1e3 * found.left_at:.3f} mm")
+    kept = [mode.value for mode in found.modes[:-1]]
+    modes = [mode for place, mode in enumerate(kept) if place == 0 or kept[place - 1] != mode]
+    print(f"modes       {', '.join(modes)}")
+    print(f"end         {pose_in_words(found.end_pose)}")
+    print(f"error       about {max(found.error, 1e-15):.1g} m, by {found.evaluations} evaluations")
+    if ends is not None:
+        large, small = 1e3 * ends.ellipse(0.9).half_axes
+        least, _, most = np.degrees(ends.pose_quantiles[:, 2])
+        print(
+            f"spread      9 of 10 ends in an ellipse of half-axes {large:.2f} and {small:.2f} mm, "
+            f"angles from {least:.2f} to {most:.2f} deg"
+        )
+
+
 def run(options: argparse.Namespace) -> None:
     """Read, simulate, say, draw."""
     check_picture(options, [options.model])
@@ -167,26 +192,7 @@ def run(options: argparse.Namespace) -> None:
     ends = None
     if options.members and body.uncertain is not None:
         ends = push_spread(body.uncertain.members(options.members), *push, **settings)
-    # Rounded to what is printed, and without the sign of zero.
-    x, y = np.round(found.end_pose[:2], 6) + 0.0
-    angle = round(math.degrees(found.end_pose[2]), 4) + 0.0
-    print(f"body        {body.name}")
-    touched = "never" if found.touched_at is None else f"after {1e3 * found.touched_at:.3f} mm"
-    print(f"touched     {touched}")
-    if found.left_at is not None:
-        print(f"left        after {1e3 * found.left_at:.3f} mm")
-    kept = [mode.value for mode in found.modes[:-1]]
-    modes = [mode for place, mode in enumerate(kept) if place == 0 or kept[place - 1] != mode]
-    print(f"modes       {', '.join(modes)}")
-    print(f"end         x {x:.6f} m, y {y:.6f} m, angle {angle:.4f} deg")
-    print(f"error       about {max(found.error, 1e-15):.1g} m, by {found.evaluations} evaluations")
-    if ends is not None:
-        large, small = 1e3 * ends.ellipse(0.9).half_axes
-        turns = np.degrees(np.quantile(ends.poses[:, 2], (0.05, 0.95)))
-        print(
-            f"spread      9 of 10 ends in an ellipse of half-axes {large:.2f} and {small:.2f} mm, "
-            f"angles from {turns[0]:.2f} to {turns[1]:.2f} deg"
-        )
+    report(body.name, found, ends)
     title = f"{body.name}, friction {options.friction:g}"
     save_figure(
         draw_push(found, body.outline, options.tip_radius, title, ends),

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,10 +20,13 @@ from limit_surface_ros.motion.sliding.slide import slide_stages, stop_bracket
 from limit_surface_ros.motion.stages import finish
 from limit_surface_ros.plots.canvas import save_figure
 from limit_surface_ros.plots.slide_view import draw_slide, write_slide_film
-from limit_surface_ros.tools.common.options import (
+from limit_surface_ros.tools.common.motion_options import (
     add_motion_options,
-    add_picture_options,
     check_film,
+    pose_in_words,
+)
+from limit_surface_ros.tools.common.options import (
+    add_picture_options,
     check_picture,
     refuse_unused,
 )
@@ -131,10 +133,7 @@ def run(options: argparse.Namespace) -> None:
         print(f"bracket     {earliest:.6f} to {latest:.6f} s, by the error of the decay model")
     for begin, end in found.rests:
         print(f"on the way  {begin:.6f} to {end:.6f} s")
-    # Rounded to what is printed, and without the sign of zero.
-    x, y = np.round(found.pose[:2], 6) + 0.0
-    angle = round(math.degrees(found.pose[2]), 4) + 0.0
-    print(f"end         x {x:.6f} m, y {y:.6f} m, angle {angle:.4f} deg")
+    print(f"end         {pose_in_words(found.pose)}")
     print(f"energy      kept to {max(found.energy_residual, 1e-16):.1g} of it")
     outline = outline_of(model)
     title = f"{model.name}, {options.mass:g} kg"

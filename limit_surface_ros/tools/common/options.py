@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from limit_surface_ros.errors import FileError, RangeError
 from limit_surface_ros.plots.canvas import DPI, SUFFIXES
-from limit_surface_ros.plots.film import FILMS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -145,42 +144,3 @@ def check_picture(options: argparse.Namespace, inputs: Iterable[Path]) -> None:
     """
     check_output(options.output, SUFFIXES, inputs)
     check_ranges(options, {"dpi": (FEWEST_DOTS, MOST_DOTS)})
-
-
-def add_motion_options(parser: argparse.ArgumentParser, body: str) -> None:
-    """Declare where a body begins, and the film of its motion.
-
-    Args:
-        parser: Where.
-        body: What of the body is at the pose, for the help.
-    """
-    parser.add_argument(
-        "--pose",
-        type=float,
-        nargs=3,
-        default=[0.0, 0.0, 0.0],
-        metavar=("X", "Y", "ANGLE"),
-        help=f"where {body} begins [m, m, rad] (0 0 0)",
-    )
-    parser.add_argument(
-        "--animate", type=Path, metavar="FILM", help=f"film to write too: {', '.join(FILMS)}"
-    )
-    parser.add_argument(
-        "--seconds", type=float, default=4.0, help="length of the film [s] (%(default)g)"
-    )
-
-
-def check_film(
-    parser: argparse.ArgumentParser, options: argparse.Namespace, inputs: Iterable[Path]
-) -> None:
-    """Refuse a film that could not be written after the work, and a length without one.
-
-    Raises:
-        FileError: See `check_output`.
-        RangeError: The length is out of its range, or does nothing.
-    """
-    check_ranges(options, {"seconds": (0.1, 120.0)})
-    if options.animate is not None:
-        check_output(options.animate, FILMS, inputs)
-    else:
-        refuse_unused(parser, options, ["seconds"], "for --animate")
