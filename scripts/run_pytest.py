@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Run pytest on the package as it is installed: the working directory is not importable here.
 
-Tests run in as many processes as there are cores, up to four, a file in one of them: many wait for
-nodes to find each other. `-n 0` runs them one after the other, as does a debugger.
+Tests run in one process more than there are cores, up to five: many wait for nodes to find each
+other. A process that is done takes tests over from the others (`worksteal`), so that no long file
+is left at the end. `-n 0` runs them one after the other, as does a debugger.
 """
 
 import os
@@ -10,7 +11,7 @@ import sys
 
 import pytest
 
-MOST_WORKERS = 4
+MOST_WORKERS = 5
 
 
 def with_workers(arguments: list[str], cores: int) -> list[str]:
@@ -18,12 +19,8 @@ def with_workers(arguments: list[str], cores: int) -> list[str]:
     chosen = any(
         each.startswith(("-n", "--numprocesses", "--pdb", "--trace")) for each in arguments
     )
-    workers = min(cores, MOST_WORKERS)
-    return (
-        arguments
-        if chosen or workers < 2
-        else ["-n", str(workers), "--dist", "loadfile", *arguments]
-    )
+    workers = min(cores + 1, MOST_WORKERS)
+    return arguments if chosen else ["-n", str(workers), "--dist", "worksteal", *arguments]
 
 
 if __name__ == "__main__":
