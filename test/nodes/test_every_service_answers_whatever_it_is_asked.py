@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import copy
 from array import array
 from operator import attrgetter
 
@@ -112,7 +113,7 @@ def serves(request, ros, client_node, tmp_path, model_file):
         node = Bench(ros, client_node, tmp_path, sim_time=False).node
         services = DECAY
     else:
-        written = model_file(normal_force=10.0, outline=Polygon(SQUARE))
+        written = model_file(terms=2, normal_force=10.0, outline=Polygon(SQUARE))
         transforms = {"static_transforms": ["object tool 1 2 3 0.1 0.2 0.3"]}
         node = ros.add(LimitSurfaceNode, files=[written[1]], parameters=transforms)
         services = SURFACE
@@ -130,7 +131,8 @@ def hold_out(serves, count):
         check = FiniteCheck(service.type.Response, service.unbounded, ("models",))
         fields = list(leaves(service.type.Request()))
         for _ in range(count):
-            asked = good(service.name, service.type)
+            # Messages share what is put into them, such as a stamp: only a copy may be spoilt.
+            asked = copy.deepcopy(good(service.name, service.type))
             for _ in range(rng.integers(0, 4) if fields else 0):
                 spoil(asked, *fields[rng.integers(len(fields))], rng)
             answer = call(asked)
