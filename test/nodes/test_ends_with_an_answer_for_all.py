@@ -63,9 +63,18 @@ def test_twenty_batches_that_wait_at_a_signal_all_get_an_answer(
     assert "Traceback" not in output
 
 
+def started_with(hang_up, *options):
+    """Start the node as a shell does, or as `nohup`: these tests may run under either."""
+    before = signal.signal(signal.SIGHUP, hang_up)
+    try:
+        return Program("limit_surface_node", "--ros-args", *options)
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
 def test_a_terminal_that_is_closed_ends_the_node_as_sigterm_does(ros, client_node, model_file):
     options = "-p", f"model_files:=['{model_file()[1]}']"
-    with Program("limit_surface_node", "--ros-args", *options) as program:
+    with started_with(signal.SIG_DFL, *options) as program:
         ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
         code, output = program.end(signal.SIGHUP)
     assert code == 0, output
@@ -74,12 +83,7 @@ def test_a_terminal_that_is_closed_ends_the_node_as_sigterm_does(ros, client_nod
 
 def test_under_nohup_a_node_outlives_its_terminal(ros, client_node, model_file):
     options = "-p", f"model_files:=['{model_file()[1]}']"
-    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    try:
-        program = Program("limit_surface_node", "--ros-args", *options)
-    finally:
-        signal.signal(signal.SIGHUP, before)
-    with program:
+    with started_with(signal.SIG_IGN, *options) as program:
         call = ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
         program.process.send_signal(signal.SIGHUP)
         asked = WrenchToTwist.Request(wrench=wrench_message([9, 0, 0]))
