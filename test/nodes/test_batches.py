@@ -21,7 +21,7 @@ from limit_surface_ros.nodes.messages import convert
 @pytest.fixture
 def batch(ros, client_node, model_file):
     """A node with one model, and its two batch services."""
-    model, path = model_file()
+    model, path = model_file(terms=3)
     ros.add(LimitSurfaceNode, files=[path])
     forward = ros.client(client_node, WrenchesToTwists, "/limit_surface/wrenches_to_twists")
     back = ros.client(client_node, TwistsToWrenches, "/limit_surface/twists_to_wrenches")

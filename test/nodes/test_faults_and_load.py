@@ -42,7 +42,7 @@ from limit_surface_ros.surface.scaling import Scaling
 from node_helpers import Program, handled, planar_twist, processor_ticks, wrench_message
 from process_helpers import WAIT
 
-PUSHES = 100
+PUSHES = 40
 CODES = {
     ErrorCode.NONE,
     ErrorCode.NOT_FINITE,
@@ -60,7 +60,7 @@ texts = st.sampled_from(["", "object", "box", "tool", "x" * 100_000]) | st.text(
 sixes = st.lists(numbers, min_size=6, max_size=6)
 flats = st.lists(numbers, max_size=12).map(lambda values: array("d", values))
 many = settings(
-    max_examples=60,
+    max_examples=20,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
     deadline=None,
 )
@@ -131,7 +131,7 @@ MODES = [
 
 @pytest.fixture(params=MODES, ids=["plain", "frames", "pressed"])
 def fuzzed(ros, client_node, model_file, request):
-    _, path = model_file(normal_force=10.0)
+    _, path = model_file(terms=2, normal_force=10.0)
     return ros.add(LimitSurfaceNode, files=[path], parameters=request.param)
 
 
@@ -140,7 +140,7 @@ def fuzzed(ros, client_node, model_file, request):
 def test_three_thousand_requests_of_each_kind_get_codes_of_the_package(
     ros, client_node, model_file, name
 ):
-    _, path = model_file(normal_force=10.0)
+    _, path = model_file(terms=2, normal_force=10.0)
     transforms = ["object tool 1 2 3 0.1 0.2 0.3"]
     node = ros.add(LimitSurfaceNode, files=[path], parameters={"static_transforms": transforms})
     service_type, requests = REQUESTS[name]
@@ -253,7 +253,7 @@ def resident(pid: int) -> int:
 
 
 def test_requests_of_a_million_rows_leave_no_memory_behind(ros, client_node, model_file):
-    _, path = model_file(terms=1)
+    _, path = model_file()
     with Program("limit_surface_node", "--ros-args", "-p", f"model_files:=['{path}']") as program:
         call = ros.client(client_node, WrenchesToTwists, "/limit_surface/wrenches_to_twists")
         flat = convert.flat_of(np.ones((1_000_000, 3)))

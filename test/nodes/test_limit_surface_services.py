@@ -24,7 +24,7 @@ from node_helpers import STAMP, planar_twist, planar_wrench, twist_message, wren
 @pytest.fixture
 def served(ros, client_node, model_file):
     """A node with one model, and its two clients."""
-    model, path = model_file()
+    model, path = model_file(terms=2)
     node = ros.add(LimitSurfaceNode, files=[path])
     forward = ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
     back = ros.client(client_node, TwistToWrench, "/limit_surface/twist_to_wrench")

@@ -25,7 +25,7 @@ from process_helpers import WAIT
 @pytest.fixture
 def streams(ros, client_node, model_file):
     """A node with one model, publishers of its inputs and what it answers."""
-    model, path = model_file()
+    model, path = model_file(terms=2)
     node = ros.add(LimitSurfaceNode, files=[path])
     twists = ros.listen(client_node, TwistStamped, "/limit_surface/predicted_twist")
     wrenches = ros.listen(client_node, WrenchStamped, "/limit_surface/required_wrench")

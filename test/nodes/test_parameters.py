@@ -29,25 +29,26 @@ def node(ros, model_file):
     return ros.add(LimitSurfaceNode, files=[model_file()[1]])
 
 
-@pytest.mark.parametrize("setting", TABLE, ids=lambda setting: setting.name)
-def test_every_parameter_is_described(node, setting):
-    descriptor = node.describe_parameter(setting.name)
-    assert descriptor.description == setting.description
-    assert descriptor.read_only == setting.read_only
-    assert descriptor.type != ParameterType.PARAMETER_NOT_SET
-    for choice in setting.choices:
-        assert choice in descriptor.additional_constraints
-    if setting.minimum is not None:
-        (span,) = [*descriptor.floating_point_range, *descriptor.integer_range]
-        assert (span.from_value, span.to_value) == (setting.minimum, setting.maximum)
+def test_every_parameter_is_described(node):
+    for setting in TABLE:
+        descriptor = node.describe_parameter(setting.name)
+        assert descriptor.description == setting.description
+        assert descriptor.read_only == setting.read_only, setting.name
+        assert descriptor.type != ParameterType.PARAMETER_NOT_SET, setting.name
+        for choice in setting.choices:
+            assert choice in descriptor.additional_constraints, setting.name
+        if setting.minimum is not None:
+            (span,) = [*descriptor.floating_point_range, *descriptor.integer_range]
+            assert (span.from_value, span.to_value) == (setting.minimum, setting.maximum)
 
 
-@pytest.mark.parametrize("setting", TABLE, ids=lambda setting: setting.name)
-def test_every_parameter_starts_at_its_default(node, setting):
-    if setting.name != "model_files":
-        assert node.values[setting.name] == setting.default
-        value = node.get_parameter(setting.name).value
-        assert (list(value) if isinstance(setting.default, list) else value) == setting.default
+def test_every_parameter_starts_at_its_default(node):
+    for setting in TABLE:
+        if setting.name != "model_files":
+            assert node.values[setting.name] == setting.default, setting.name
+            value = node.get_parameter(setting.name).value
+            found = list(value) if isinstance(setting.default, list) else value
+            assert found == setting.default, setting.name
 
 
 @pytest.mark.parametrize(
