@@ -85,7 +85,7 @@ def test_a_steep_start_is_no_outlier():
     assert len(fit.outliers) == 0
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_terms_that_die_within_a_step_do_not_follow_the_first_samples(seed):
     def held(t):
         return 8.0 * np.clip((3.5 - t) / 0.5, 0.0, 1.0)
@@ -99,7 +99,7 @@ def test_terms_that_die_within_a_step_do_not_follow_the_first_samples(seed):
     assert np.abs(fit.fit.sum(start) - 8.0).max() < 4.0 * fit.noise
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_more_terms_than_a_response_has_do_not_follow_noise_at_any_frequency(seed):
     rates, weights = np.array([-0.5, -3.0, -20.0]), np.array([0.4, 0.4, 0.2])
 

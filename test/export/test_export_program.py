@@ -69,46 +69,52 @@ def test_wrong_targets_and_places_are_refused(model_file, capsys):
     assert "input" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "*/ x",
-        "a\nb",
-        'tri"""ple',
-        "back\\slash\\",
-        "\\U",
-        "@NAME@",
-        "x\u2028y",
-        "--><x>",
-        "\u03c0" * 400,
-    ],
-)
-def test_no_name_of_a_model_speaks_in_its_text(name, tmp_path):
+STRANGE_NAMES = [
+    "*/ x",
+    "a\nb",
+    'tri"""ple',
+    "back\\slash\\",
+    "\\U",
+    "@NAME@",
+    "x\u2028y",
+    "--><x>",
+    "\u03c0" * 400,
+]
+
+
+def exported(name, target):
     model = SurfaceModel(name, MODELS["dissipation_4"], frame_id=name)
-    texts = {target: export_surface(model, target).text for target in SUFFIXES}
+    return export_surface(model, target).text
+
+
+@pytest.mark.parametrize("name", STRANGE_NAMES)
+def test_no_name_of_a_model_speaks_in_its_text(name, tmp_path):
     for target in ("casadi", "jax"):
-        tree = ast.parse(texts[target])
+        tree = ast.parse(exported(name, target))
         (given,) = (
             each.value.value
             for each in tree.body
             if isinstance(each, ast.Assign) and each.targets[0].id == "NAME"
         )
         assert given == name
-    ElementTree.fromstring(texts["mujoco"])
-    assert np.shape(yaml.safe_load(texts["ellipsoid"])["L"]) == (3, 3)
-    for program, target, options in (
-        (
-            "g++",
-            "cpp",
-            ["-std=c++17", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", "-x", "c++"],
-        ),
-        ("node", "js", ["--check"]),
-    ):
-        path = tmp_path / f"model{SUFFIXES[target]}"
-        path.write_text(texts[target], encoding="utf-8")
-        if shutil.which(program):
-            source = path
-            if target == "cpp":
-                source = tmp_path / "model.cpp"
-                source.write_text('#include "model.hpp"', encoding="utf-8")
-            subprocess.run([program, *options, source], check=True)
+    ElementTree.fromstring(exported(name, "mujoco"))
+    assert np.shape(yaml.safe_load(exported(name, "ellipsoid"))["L"]) == (3, 3)
+    script = tmp_path / f"model{SUFFIXES['js']}"
+    script.write_text(exported(name, "js"), encoding="utf-8")
+    if shutil.which("node"):
+        subprocess.run(["node", "--check", script], check=True)
+
+
+def test_headers_of_models_of_any_names_compile_beside_each_other(tmp_path):
+    if not shutil.which("g++"):
+        pytest.skip("no C++ compiler")
+    headers = [exported(name, "cpp") for name in STRANGE_NAMES]
+    for place, header in enumerate(headers):
+        (tmp_path / f"{place}.hpp").write_text(header, encoding="utf-8")
+    # A guard that two shared would hide one of them.
+    guards = {re.search(r"^#ifndef (\w+)$", header, re.MULTILINE)[1] for header in headers}
+    assert len(guards) == len(headers)
+    source = tmp_path / "all.cpp"
+    source.write_text("".join(f'#include "{place}.hpp"\n' for place in range(len(headers))))
+    strict = ["-std=c++17", "-fsyntax-only", "-Wall", "-Wextra", "-Werror"]
+    subprocess.run(["g++", *strict, source], check=True)

@@ -78,7 +78,7 @@ def test_rescaling_again_and_again_keeps_no_memory(kind):
     surface.load_factor([1.0, 2.0, 3.0])
 
     def rescale_many():
-        for index in range(500):
+        for index in range(100):
             surface.scaled(1.0 + 1e-3 * index).twist_of_wrench([1.0, 2.0, 3.0])
         gc.collect()
 
@@ -89,7 +89,7 @@ def test_rescaling_again_and_again_keeps_no_memory(kind):
     rescale_many()
     after = tracemalloc.get_traced_memory()[0]
     tracemalloc.stop()
-    assert after - before < 10_000
+    assert after - before < 2_000
 
 
 @pytest.mark.parametrize("factor", [0.0, -1.0, np.nan, np.inf, "heavy"])
