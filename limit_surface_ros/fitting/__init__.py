@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Offline fits of limit surfaces to pairs of wrench and twist; never imported by a node."""
+"""Fits of limit surfaces to pairs of wrench and twist; of it a node imports the learner alone."""
