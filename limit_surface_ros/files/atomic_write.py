@@ -9,6 +9,9 @@ from pathlib import Path
 
 from limit_surface_ros.errors import FileError
 
+# Characters of the name, of up to four bytes each, in that of the part: file systems take 255.
+_MOST = 50
+
 
 def write_atomically(path: str | Path, content: str | bytes) -> None:
     """Write a file in one step: whoever reads sees all of it or what was there before.
@@ -23,19 +26,51 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
     """
     part: Path | None = None
     try:
-        # Where a link points, not the link, is what gets new content.
-        target = Path(path).resolve()
-        if target.exists() and not target.is_file():
-            raise FileError(f"{path}: cannot be written: it is no regular file")
+        target = _target(path)
         # Named before it is there, so that an interrupt at any moment finds what to take away.
-        part = target.with_name(f".{target.name}.{secrets.token_hex(8)}")
+        part = target.with_name(f".{target.name[:_MOST]}.{secrets.token_hex(8)}")
         with part.open("xb") as stream:
             stream.write(content.encode() if isinstance(content, str) else content)
             stream.flush()
             os.fsync(stream.fileno())
         part.replace(target)
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror or error}") from None
+    except FileError:
+        raise
+    except (OSError, RuntimeError, ValueError) as error:
+        raise _unwritable(path, error) from None
     finally:
         if part is not None:
             part.unlink(missing_ok=True)
+
+
+def check_writable(path: str | Path) -> Path:
+    """Return where `write_atomically` would write; for those who write long after they were told.
+
+    Raises:
+        FileError: The folder is absent or not writable, or something that is no regular file
+            stands at the path.
+    """
+    try:
+        target = _target(path)
+        if not target.parent.is_dir():
+            raise FileError(f"{path}: its folder does not exist: make {target.parent} first")
+        if not os.access(target.parent, os.W_OK | os.X_OK):
+            raise FileError(f"{path}: cannot be written: its folder is read-only")
+    except FileError:
+        raise
+    except (OSError, RuntimeError, ValueError) as error:
+        # A name too long or with a NUL in it, no permission on the way, a loop of links.
+        raise _unwritable(path, error) from None
+    return target
+
+
+def _target(path: str | Path) -> Path:
+    """Return where a link points: that, and not the link, gets new content."""
+    target = Path(path).resolve()
+    if target.exists() and not target.is_file():
+        raise FileError(f"{path}: cannot be written: it is no regular file")
+    return target
+
+
+def _unwritable(path: str | Path, error: Exception) -> FileError:
+    return FileError(f"{path}: cannot be written: {getattr(error, 'strerror', None) or error}")

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from limit_surface_ros.checks import LARGEST
 from limit_surface_ros.errors import FileError
-from limit_surface_ros.files.atomic_write import write_atomically
+from limit_surface_ros.files.atomic_write import check_writable, write_atomically
 from limit_surface_ros.files.yaml_reader import _Loader, read_yaml, write_yaml
 
 
@@ -330,3 +330,36 @@ def test_a_written_file_has_the_permissions_that_the_umask_leaves(tmp_path):
 def test_the_header_is_a_comment_at_the_top(tmp_path):
     write_yaml(tmp_path / "model.yaml", {"a": 1.0}, header="made by\n\nhand")
     assert (tmp_path / "model.yaml").read_text() == "# made by\n#\n# hand\na: 1.0\n"
+
+
+@pytest.mark.parametrize("name", ["y" * 250 + ".yaml", "ü" * 127])
+def test_names_as_long_as_file_systems_allow_can_be_written(tmp_path, name):
+    target = tmp_path / name
+    assert check_writable(target) == target
+    write_atomically(target, "text")
+    assert target.read_text() == "text"
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("y" * 256, "cannot be written: File name too long"),
+        ("absent/model.yaml", "its folder does not exist: make"),
+        ("folder", "cannot be written: it is no regular file"),
+        ("a\0b", "cannot be written: embedded null byte"),
+        ("loop/model.yaml", r"model\.yaml: "),
+    ],
+)
+def test_what_could_not_be_written_is_told_ahead(tmp_path, name, message):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "loop").symlink_to("loop")
+    with pytest.raises(FileError, match=message):
+        check_writable(tmp_path / name)
+    with pytest.raises(FileError, match="cannot be written"):
+        write_atomically(tmp_path / name, "text")
+
+
+def test_a_text_that_utf8_cannot_hold_is_refused(tmp_path):
+    with pytest.raises(FileError, match="cannot be written: 'utf-8' codec"):
+        write_atomically(tmp_path / "model.yaml", "name: \udcff")
+    assert not list(tmp_path.iterdir())

@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 import argparse
-import os
+import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from limit_surface_ros.errors import FileError, RangeError
+from limit_surface_ros.files.atomic_write import check_writable
 from limit_surface_ros.plots.canvas import DPI, SUFFIXES
 
 if TYPE_CHECKING:
@@ -99,23 +100,19 @@ def check_output(output: Path, suffixes: Sequence[str], inputs: Iterable[Path] =
     """
     if output.suffix.lower() not in suffixes:
         raise FileError(f"{output}: cannot be written: must end in {' or '.join(suffixes)}")
-    try:
-        # Where a link points, not the link, is what gets new content.
-        target = output.resolve()
-        if not target.parent.is_dir():
-            raise FileError(f"{output}: its folder does not exist: make {target.parent} first")
-        if target.exists() and not target.is_file():
-            raise FileError(f"{output}: cannot be written: it is no regular file")
-        if not os.access(target.parent, os.W_OK | os.X_OK):
-            raise FileError(f"{output}: cannot be written: its folder is read-only")
-        for source in inputs:
-            if source.exists() and target.exists() and source.samefile(target):
-                raise FileError(
-                    f"{output}: is the input {source}, which would be lost: name another output"
-                )
-    except (OSError, RuntimeError) as error:
-        # A name too long, no permission on the way, a loop of links.
-        raise FileError(f"{output}: cannot be written: {error}") from None
+    target = check_writable(output)
+    for source in inputs:
+        if same_file(source, target):
+            raise FileError(
+                f"{output}: is the input {source}, which would be lost: name another output"
+            )
+
+
+def same_file(first: Path, second: Path) -> bool:
+    """Tell whether two names are of one file, if only through a link."""
+    with contextlib.suppress(OSError, ValueError):
+        return first.samefile(second)
+    return False
 
 
 def add_picture_options(parser: argparse.ArgumentParser, default: str) -> None:
