@@ -62,7 +62,8 @@ def worker_processes(workers: int) -> Iterator[Executor]:
         drain = _Drain(pool)
         _forget_what_waits(pool)
         for process in set(multiprocessing.active_children()) - others:
-            process.terminate()
+            # One that was stopped would keep any other signal for later.
+            process.kill()
         drain.run_until_pool_has_ended()
         raise
     finally:

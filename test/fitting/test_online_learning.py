@@ -212,6 +212,24 @@ def test_gaps_rests_and_lost_contact_end_a_segment(stop, count):
     assert len(closed) == count
 
 
+@pytest.mark.parametrize("stamps", ["equal", "ten of a time", "swapped", "one late"])
+def test_segments_take_samples_whose_stamps_do_not_rise(stamps):
+    times = 0.001 * np.arange(100)
+    if stamps == "equal":
+        times[:] = 7.0
+    elif stamps == "ten of a time":
+        times = np.repeat(times[::10], 10)
+    elif stamps == "swapped":
+        times = times.reshape(-1, 2)[:, ::-1].ravel()
+    else:
+        times[50] -= 0.04
+    segments = Segments(SCALING)
+    closed = [segments.feed(each, [3.0, 0.0, 0.0], [0.02, 0.0, 0.0]) for each in times]
+    assert closed == [None] * 100
+    wrench, twist = segments.close()
+    np.testing.assert_allclose([*wrench, *twist], [3.0, 0.0, 0.0, 1.0, 0.0, 0.0])
+
+
 def test_segments_refuse_what_is_no_number():
     with pytest.raises(RangeError, match="turn_deg must be above 0"):
         Segments(SCALING, turn_deg=0.0)

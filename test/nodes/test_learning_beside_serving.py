@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 from dataclasses import replace
 
 import numpy as np
@@ -208,10 +209,59 @@ def test_measurements_that_teach_nothing_do_no_harm(ros, client_node, prior):
     robot.measure(node, [(np.nan, 0.0, 0.0)], [(0.02, np.nan, 0.0)])
     assert node.health.refused["measured_twist", "NOT_FINITE"] == 1
     robot.twists.publish(twist_message((0.02, 0.0, 0.0), stamp=Time(sec=99)))
-    ros.wait(lambda: node.health.reported["measured twist without a wrench"] == 1)
     robot.time = 1.0
+    robot.sample(np.zeros(3), np.zeros(3))
+    ros.wait(lambda: node.health.reported["measured twist without a wrench"] == 1)
     robot.push(node, BODY, 1, 2)
     assert node.learner.count >= 2
+
+
+def test_a_twist_that_comes_before_its_wrench_waits_for_it(ros, client_node, prior):
+    node = ros.add(LimitSurfaceNode, files=[prior], parameters={"learn": True})
+    robot = Robot(ros, client_node)
+    sides = (
+        (robot.twists, twist_message, (0.02, 0.005, 0.1), "measured_twist"),
+        (robot.wrenches, wrench_message, (5.0, 1.0, 0.1), "measured_wrench"),
+    )
+    for number in range(10):
+        # At 20 Hz, so that the wrench before is of another time.
+        stamp = Time(sec=5, nanosec=50_000_000 * number)
+        for publisher, message, vector, name in sides:
+            taken = node.health.accepted[name]
+            publisher.publish(message(vector if number < 9 else (0.0, 0.0, 0.0), stamp=stamp))
+            ros.wait(lambda taken=taken, name=name: node.health.accepted[name] > taken)
+    ros.wait(lambda: node.learner.count == 1)
+
+
+def test_measurements_without_stamps_are_of_the_present(ros, client_node, prior):
+    node = ros.add(LimitSurfaceNode, files=[prior], parameters={"learn": True})
+    robot = Robot(ros, client_node)
+    for number in range(400):
+        taken = node.health.accepted["measured_twist"]
+        moving = float(number % 20 > 0)
+        robot.wrenches.publish(wrench_message((5.0 * moving, moving, 0.0), stamp=Time()))
+        robot.twists.publish(twist_message((0.02 * moving, 0.0, 0.0), stamp=Time()))
+        ros.wait(lambda taken=taken: node.health.accepted["measured_twist"] > taken)
+        if node.learner.count:
+            break
+    ros.wait(lambda: node.learner.count)
+
+
+def test_a_node_ends_whose_learning_process_does_not_answer(ros, client_node, prior):
+    before = set(multiprocessing.active_children())
+    node = ros.add(LimitSurfaceNode, files=[prior], parameters={"learn": True})
+    robot = Robot(ros, client_node)
+    robot.push(node, BODY, 1, 1)
+    (process,) = set(multiprocessing.active_children()) - before
+    os.kill(process.pid, signal.SIGSTOP)
+    for _ in range(2):
+        for _ in range(8):
+            robot.sample((5.0, 1.0, 0.1), (0.02, 0.005, 0.1))
+        robot.time += 1.0
+        robot.sample(np.zeros(3), np.zeros(3))
+    ros.wait(lambda: "1 waiting" in node.describe()["learning"])
+    node.learner.close()
+    ros.wait(lambda: not process.is_alive())
 
 
 def test_what_learning_cannot_begin_with_is_refused(ros, prior, tmp_path):
@@ -219,6 +269,17 @@ def test_what_learning_cannot_begin_with_is_refused(ros, prior, tmp_path):
         ros.add(
             LimitSurfaceNode, files=[prior], parameters={"learn": True, "learn_prior": "absent"}
         )
+    for place, message in (
+        (tmp_path / "absent" / "learnt.yaml", "its folder does not exist: make"),
+        (tmp_path / f"{'long' * 99}.yaml", "cannot be written: File name too long"),
+        (tmp_path, "cannot be written: it is no regular file"),
+    ):
+        with pytest.raises(FileError, match=message):
+            ros.add(
+                LimitSurfaceNode,
+                files=[prior],
+                parameters={"learn": True, "learn_file": str(place)},
+            )
     with pytest.raises(FileError, match="is no learnt model"):
         ros.add(
             LimitSurfaceNode,

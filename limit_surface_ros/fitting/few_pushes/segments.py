@@ -59,7 +59,8 @@ class Segments:
             least: Samples of a segment at least.
             least_force: Load below which there is no contact, in parts of the friction force.
             least_speed: Speed below which the body is at rest, in scaled variables [m/s].
-            most_gap: Time between samples that ends a segment [s].
+            most_gap: Time between samples that ends a segment [s]. One that is behind by less has
+                come late, and counts like the others.
 
         Raises:
             RangeError: A number is not above zero.
@@ -91,7 +92,7 @@ class Segments:
         """Take a sample; return the pair of the segment that it ends, if it ends one.
 
         Args:
-            stamp: [s], rising; one that does not rise ends the segment.
+            stamp: [s]. Equal ones are those of a clock that rises more slowly than samples come.
             wrench: (fx, fy, tau_z) [N, N, N m], shape (3,).
             twist: (vx, vy, omega_z) [m/s, m/s, rad/s] at the same time, shape (3,).
 
@@ -104,9 +105,9 @@ class Segments:
         load = as_floats("wrench", wrench) / self._scaling.wrench_unit
         motion = as_floats("twist", twist) / self._scaling.twist_unit
         speed = float(np.linalg.norm(motion))
-        late = self._stamp is not None and not 0.0 < stamp - self._stamp <= self._most_gap
-        closed = self.close() if late else None
-        self._stamp = stamp
+        gap = self._stamp is not None and not abs(stamp - self._stamp) <= self._most_gap
+        closed = self.close() if gap else None
+        self._stamp = stamp if self._stamp is None else max(stamp, self._stamp)
         if float(np.linalg.norm(load)) < self._least_force or speed < self._least_speed:
             return closed or self.close()
         motion = motion / speed
@@ -114,8 +115,9 @@ class Segments:
         if self._first is None and len(self._runs) == _RUN:
             self._first = self._mean()
         elif self._first is not None and self._has_turned():
+            newest = self._stamp
             closed = self.close()
-            self._stamp = stamp
+            self._stamp = newest
             self._runs.append((load, motion))
         self._loads.append(load)
         self._motions.append(motion)

@@ -12,25 +12,27 @@ import collections
 import contextlib
 import queue
 import threading
-from concurrent.futures import BrokenExecutor
+from concurrent.futures import TimeoutError as FutureTimeout
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from geometry_msgs.msg import TwistStamped, WrenchStamped
 
 from limit_surface_ros.errors import DataError, FileError, LimitSurfaceError, UnavailableError
+from limit_surface_ros.files.atomic_write import check_writable
 from limit_surface_ros.files.surface_file import (
     SurfaceModel,
     read_surface_model,
     write_surface_model,
 )
+from limit_surface_ros.nodes.limit_surface.measurement_pairs import SAME_TIME, MeasurementPairs
 from limit_surface_ros.nodes.messages import convert
 from limit_surface_ros.nodes.serving.settings import Setting
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
+    from collections.abc import Iterable
+    from concurrent.futures import Executor, Future
 
     from std_srvs.srv import Trigger
 
@@ -67,16 +69,18 @@ SETTINGS = (
     ),
 )
 SUFFIX = "_learnt"
-# Measurements of both kinds whose stamps differ by no more are of one time [ns].
-_SAME_TIME = 20_000_000
-# Wrenches that wait for their twist, segments that wait to be learnt.
-_WRENCHES, _SEGMENTS = 100, 100
+# Segments that wait to be learnt.
+_SEGMENTS = 100
 # Pushes of which diagnostics tell how well they were predicted.
 _TOLD = 10
 # Ends of the process, without a push that was learnt in between, after which it is let be.
 _MOST_ENDS = 3
-# Between looks whether the node is run [s].
+# Between looks whether the node is run, or ends [s].
 _PAUSE = 0.02
+
+
+class _ClosedError(Exception):
+    """The node ends: leaving with an error ends the process at once, whatever it does."""
 
 
 class Learner:
@@ -91,7 +95,7 @@ class Learner:
 
     Raises:
         UnknownModelError: The prior is not loaded.
-        FileError: The file to go on from is not valid.
+        FileError: The file to go on from is not valid, or there is no folder to save it in.
     """
 
     def __init__(self, node: Any) -> None:
@@ -107,7 +111,7 @@ class Learner:
         stored = self._stored()
         self._state = None if stored is None else stored.fit["online"]
         self._segments = Segments(self._prior.surface.scaling)
-        self._wrenches: collections.deque[tuple[int, Any]] = collections.deque(maxlen=_WRENCHES)
+        self._pairs = MeasurementPairs(self._tell_of_a_twist_alone)
         self._work: queue.Queue[tuple[Any, Any] | None] = queue.Queue(_SEGMENTS)
         self._model = stored
         self._last: collections.deque[Update] = collections.deque(maxlen=_TOLD)
@@ -127,6 +131,8 @@ class Learner:
     def describe(self) -> dict[str, str]:
         """Return what diagnostics say of it."""
         lines = {"learning": f"{self.name}, {self.count} pushes, {self._refused} refused"}
+        if waiting := self._work.qsize():
+            lines["learning"] += f", {waiting} waiting"
         if self._stopped:
             lines["learning"] += f"; stopped: {self._stopped}"
         if self._last:
@@ -141,7 +147,7 @@ class Learner:
         return lines
 
     def close(self) -> None:
-        """End the thread and its process after the push that they are at."""
+        """End the thread and its process."""
         self._closed.set()
         while not self._work.empty():
             try:
@@ -151,33 +157,39 @@ class Learner:
         self._work.put(None)
 
     async def _take_wrench(self, message: WrenchStamped) -> None:
-        stamp = convert.nanoseconds(message.header.stamp)
+        stamp = self._time(message)
         surface, wrench, _ = await self._node.input.wrench(self._prior, message)
         # As it would be at the normal force that the model holds at.
         pressed = surface.scaling.friction_force / self._prior.surface.scaling.friction_force
-        if self._wrenches and stamp < self._wrenches[-1][0] - _SAME_TIME:
-            # Time was turned back: a bag begins anew, say.
-            self._wrenches.clear()
-        self._wrenches.append((stamp, wrench / pressed))
+        self._feed(self._pairs.add_wrench(stamp, wrench / pressed))
 
     async def _take_twist(self, message: TwistStamped) -> None:
-        stamp = convert.nanoseconds(message.header.stamp)
+        stamp = self._time(message)
         _, twist, _ = await self._node.input.twist(self._prior, message)
-        nearest = min(self._wrenches, key=lambda each: abs(each[0] - stamp), default=(None, None))
-        if nearest[0] is None or abs(nearest[0] - stamp) > _SAME_TIME:
-            self._node.report(
-                "measured twist without a wrench",
-                "a twist on ~/measured_twist has no wrench of its time, at most "
-                f"{_SAME_TIME // 1_000_000} ms apart, and teaches nothing",
-            )
-            return
-        segment = self._segments.feed(1e-9 * stamp, nearest[1], twist)
-        if segment is None or self._stopped:
-            return
-        try:
-            self._work.put_nowait(segment)
-        except queue.Full:
-            self._node.report("push not learnt", "pushes come faster than they are learnt")
+        self._feed(self._pairs.add_twist(stamp, twist))
+
+    def _time(self, message: WrenchStamped | TwistStamped) -> int:
+        """Return the time of a measurement [ns]: without a stamp the present."""
+        stamp = convert.nanoseconds(message.header.stamp)
+        return stamp or int(self._node.get_clock().now().nanoseconds)
+
+    def _tell_of_a_twist_alone(self) -> None:
+        self._node.report(
+            "measured twist without a wrench",
+            "a twist on ~/measured_twist has no wrench of its time, at most "
+            f"{SAME_TIME // 1_000_000} ms apart, and teaches nothing",
+        )
+
+    def _feed(self, pairs: Iterable[tuple[int, Any, Any]]) -> None:
+        """Cut pairs of one time into segments, and have those learnt."""
+        for stamp, wrench, twist in pairs:
+            segment = self._segments.feed(1e-9 * stamp, wrench, twist)
+            if segment is None or self._stopped:
+                continue
+            try:
+                self._work.put_nowait(segment)
+            except queue.Full:
+                self._node.report("push not learnt", "pushes come faster than they are learnt")
 
     def _learn(self) -> None:
         """Have the queue learnt until it says to end; in a thread of its own."""
@@ -190,19 +202,28 @@ class Learner:
                 with worker_processes(1) as process:
                     self._learn_in(process)
                 return
-            except BrokenExecutor:
+            except _ClosedError:
+                return
+            except Exception as error:
+                # It was killed, could not be started, or met a defect, after which what it holds
+                # is not known.
                 ends = 1 if self._learnt > known else ends + 1
-                self._tell("the process that learns has ended; another goes on")
+                self._tell(f"the process that learns has ended: {error or type(error).__name__}")
         self._stop("its process ends again and again")
 
     def _learn_in(self, process: Executor) -> None:
-        """Hand the queue over to a process."""
+        """Hand the queue over to a process until learning is stopped.
+
+        Raises:
+            _ClosedError: The node ends.
+            Exception: The process has ended, or must not go on.
+        """
         # The process imports this anew: it must not import ROS.
         from limit_surface_ros.nodes.limit_surface import learning_process
 
         begin = (replace(self._prior, fit={}), self.name, self._forgetting, self._state)
         try:
-            model = process.submit(learning_process.begin, *begin).result()
+            model = self._result(process.submit(learning_process.begin, *begin))
         except LimitSurfaceError as error:
             self._stop(str(error))
             return
@@ -211,9 +232,9 @@ class Learner:
         while True:
             segment = self._work.get()
             if segment is None:
-                return
+                raise _ClosedError
             try:
-                learnt = process.submit(learning_process.learn, *segment).result()
+                learnt = self._result(process.submit(learning_process.learn, *segment))
             except LimitSurfaceError as error:
                 self._refused += 1
                 self._tell(f"a push was not learnt: {error}")
@@ -222,6 +243,18 @@ class Learner:
                 self._refused += 1
             else:
                 self._finish(learnt.model, learnt.update)
+
+    def _result(self, future: Future[Any]) -> Any:
+        """Return what the process answers.
+
+        Raises:
+            _ClosedError: The node ends, which does not wait for a process that may have stopped.
+            Exception: What the process raised.
+        """
+        while not self._closed.is_set():
+            with contextlib.suppress(FutureTimeout):
+                return future.result(_PAUSE)
+        raise _ClosedError
 
     def _finish(self, model: SurfaceModel, update: Update | None) -> None:
         """Have the node's thread serve what is learnt."""
@@ -255,7 +288,8 @@ class Learner:
 
     def _stored(self) -> SurfaceModel | None:
         """Return the model of the file to go on from, None where there is none."""
-        if not self._path or not Path(self._path).exists():
+        # At the end of an hour of pushes it would be too late to be told.
+        if not self._path or not check_writable(self._path).exists():
             return None
         from limit_surface_ros.fitting.few_pushes.online import pushes_of_state
 
