@@ -18,16 +18,20 @@ from process_helpers import WAIT
 
 
 def _own_domain() -> tuple[int, socket.socket]:
-    """Return a ROS domain that no other test run on this machine has, and what keeps it."""
-    for domain in range(1, 101):
-        lock = socket.socket()
+    """Return a ROS domain that nothing else on this machine has, and what keeps it.
+
+    Claimed as `scripts/with_ros --isolated` does: its programs must not be heard either.
+    """
+    claim = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    for offset in range(101):
+        # Anywhere: what ended a moment ago may still be heard in its domain.
+        domain = 1 + (os.getpid() + offset) % 101
         try:
-            lock.bind(("127.0.0.1", 22119 + domain))
+            claim.bind(f"\0limit_surface_ros/domain/{domain}")
         except OSError:
-            lock.close()
-        else:
-            return domain, lock
-    raise RuntimeError("all ROS domains are taken by other test runs")
+            continue
+        return domain, claim
+    raise RuntimeError("all ROS domains are taken by other runs")
 
 
 _DOMAIN, _LOCK = _own_domain()
