@@ -208,9 +208,11 @@ def test_measurements_that_teach_nothing_do_no_harm(ros, client_node, prior):
     robot.measure(node, [(5.0, 0.0, 0.0)] * 4, [(0.02, 0.0, 0.0)] * 4)
     robot.measure(node, [(np.nan, 0.0, 0.0)], [(0.02, np.nan, 0.0)])
     assert node.health.refused["measured_twist", "NOT_FINITE"] == 1
+    taken = node.health.accepted["measured_twist"]
     robot.twists.publish(twist_message((0.02, 0.0, 0.0), stamp=Time(sec=99)))
+    ros.wait(lambda: node.health.accepted["measured_twist"] > taken)
     robot.time = 1.0
-    robot.sample(np.zeros(3), np.zeros(3))
+    robot.measure(node, np.zeros((1, 3)), np.zeros((1, 3)))
     ros.wait(lambda: node.health.reported["measured twist without a wrench"] == 1)
     robot.push(node, BODY, 1, 2)
     assert node.learner.count >= 2
@@ -254,12 +256,12 @@ def test_a_node_ends_whose_learning_process_does_not_answer(ros, client_node, pr
     robot.push(node, BODY, 1, 1)
     (process,) = set(multiprocessing.active_children()) - before
     os.kill(process.pid, signal.SIGSTOP)
+    loads, motions = np.tile((5.0, 1.0, 0.1), (9, 1)), np.tile((0.02, 0.005, 0.1), (9, 1))
+    loads[-1] = motions[-1] = 0.0
+    # One that the process has, and one that waits for it.
     for _ in range(2):
-        for _ in range(8):
-            robot.sample((5.0, 1.0, 0.1), (0.02, 0.005, 0.1))
-        robot.time += 1.0
-        robot.sample(np.zeros(3), np.zeros(3))
-    ros.wait(lambda: "1 waiting" in node.describe()["learning"])
+        robot.measure(node, loads, motions)
+    ros.wait(lambda: node.describe()["pushes that wait"] == "1")
     node.learner.close()
     ros.wait(lambda: not process.is_alive())
 

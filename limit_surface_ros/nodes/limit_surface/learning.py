@@ -131,10 +131,9 @@ class Learner:
     def describe(self) -> dict[str, str]:
         """Return what diagnostics say of it."""
         lines = {"learning": f"{self.name}, {self.count} pushes, {self._refused} refused"}
-        if waiting := self._work.qsize():
-            lines["learning"] += f", {waiting} waiting"
         if self._stopped:
             lines["learning"] += f"; stopped: {self._stopped}"
+        lines["pushes that wait"] = str(self._work.qsize())
         if self._last:
             before, prior = (
                 np.degrees([getattr(update, name) for update in self._last])
