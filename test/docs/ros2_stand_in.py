@@ -42,20 +42,25 @@ class Peer:
     def __enter__(self):
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
+        from rclpy.task import Future
 
         rclpy.init()
         self.node = rclpy.create_node(f"stand_in_{os.getpid()}")
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
-        self.thread = threading.Thread(target=self.executor.spin)
+        self.over = Future()
+        spin = self.executor.spin_until_future_complete
+        self.thread = threading.Thread(target=spin, args=(self.over,))
         self.thread.start()
         return self.node
 
     def __exit__(self, *_):
         import rclpy
 
-        self.executor.shutdown()
+        # First the thread: rclpy's `shutdown` takes from one that runs what it needs.
+        self.over.set_result(None)
         self.thread.join()
+        self.executor.shutdown()
         self.node.destroy_node()
         rclpy.shutdown()
 
