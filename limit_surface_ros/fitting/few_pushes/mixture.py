@@ -61,7 +61,7 @@ def usual_mixture(with_support: bool) -> list[tuple[Recipe, float]]:
     """
     if with_support:
         return [(SUPPORT, 0.7), (PRESSURE, 0.2), (THREE_TERMS, 0.07), (ELLIPSOID, 0.03)]
-    return [(PRESSURE, 0.7), (THREE_TERMS, 0.2), (ELLIPSOID, 0.1)]
+    return [(PRESSURE, 0.8), (THREE_TERMS, 0.15), (ELLIPSOID, 0.05)]
 
 
 def mixed(parts: Iterable[tuple[float, LimitSurface]]) -> Dissipation:
