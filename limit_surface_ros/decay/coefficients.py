@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -21,9 +22,14 @@ from scipy import optimize
 from limit_surface_ros.checks import as_floats, as_positive
 from limit_surface_ros.decay.basis import as_rates, constant_columns, real_basis
 from limit_surface_ros.decay.exponential_sum import ExponentialSum
-from limit_surface_ros.decay.grids import error_at, fit_times, highest_error, largest_error
+from limit_surface_ros.decay.grids import error_at, fit_times, highest_error, largest_error, peaks
 from limit_surface_ros.decay.minimax import orthonormal_basis, solve_minimax
-from limit_surface_ros.decay.tail import tail_times, tail_weight
+from limit_surface_ros.decay.tail import (
+    LEAST_WEIGHT,
+    closer_tail_times,
+    tail_times,
+    tail_weight,
+)
 from limit_surface_ros.decay.targets import Record
 from limit_surface_ros.errors import RangeError, ShapeError, SolverError
 
@@ -40,7 +46,10 @@ NORMS = ("inf", "2", "1")
 MOST_EXCHANGES = 8
 # A sum is held after the end if it is there so many times as large as it may be.
 OVER = 1.01
-HOLDING_ROUNDS = 3
+# Most rounds until the weight of what comes after is found, and most that a round trusts its
+# secant; and most rounds of adding times after the end at which the sum is larger than it may be.
+HOLDING_ROUNDS, MOST_POWER = 16, 0.9
+TAIL_EXCHANGES = 4
 BISECTIONS = 12
 
 
@@ -273,13 +282,21 @@ def _held(
     if not isinstance(response, Record):
         times = fit_times(response, free.end, float(np.abs(rates.imag).max()))
     basis, target = real_basis(rates, times), response(times)
-    tail = real_basis(rates, after)
-    tail[:, constant_columns(rates)] = 0.0
-    error = free.max_error
-    for _ in range(HOLDING_ROUNDS):
-        rows = tail * tail_weight(error, envelope)
-        held, value, bound = exchange(basis, target, response, times, rows)
-        error = float(np.abs(basis @ held - target).max())
+    tail = _tail_basis(rates, after)
+    closer = closer_tail_times(rates, free.end)
+    closer_tail = _tail_basis(rates, closer)
+    level = free.max_error
+    for _ in range(TAIL_EXCHANGES):
+        held, value, bound = _balanced(
+            partial(_weighted, basis, target, response, times, tail), level, envelope
+        )
+        sizes = np.abs(closer_tail @ held)
+        over = peaks(sizes) & (sizes > OVER * max(envelope, value))
+        if not over.any():
+            break
+        # Between the times at which it is held a fast swing may still be larger.
+        tail, level = np.concatenate([tail, closer_tail[over]]), value
+    error = float(np.abs(basis @ held - target).max())
     x = ExponentialSum.from_weights(rates, held)
     if norm == "inf":
         return replace(free, sum=x, grid_error=value, lower_bound=bound)
@@ -293,6 +310,47 @@ def _held(
     weights = (1.0 - high) * free.sum.weights + high * held
     value = norm_of(basis @ weights - target, norm)
     return replace(free, sum=ExponentialSum.from_weights(rates, weights), grid_error=value)
+
+
+def _tail_basis(rates: Complexes, times: Floats) -> Floats:
+    """Return the terms after the end, where a constant is not held, shape (n, terms)."""
+    basis = real_basis(rates, times)
+    basis[:, constant_columns(rates)] = 0.0
+    return basis
+
+
+def _weighted(
+    basis: Floats, target: Floats, response: Target, times: Floats, tail: Floats, weight: float
+) -> tuple[Floats, float, float]:
+    """Minimise the largest error and the tail, which counts so much."""
+    return exchange(basis, target, response, times, tail * weight)
+
+
+def _balanced(
+    solve_with: Callable[[float], tuple[Floats, float, float]], free_error: float, envelope: float
+) -> tuple[Floats, float, float]:
+    """Return the fit that weighs times after the end so that the envelope counts as its error.
+
+    The weight is a fixed point, which a secant in logarithms approaches from the free fit. A few
+    plain rounds do not: terms that nearly cancel meet a record to rounding, and the error that
+    holds them is then many times, up to twelve digits, the one to start from.
+    """
+    weight = tail_weight(free_error, envelope)
+    before: tuple[float, float] | None = None
+    for _ in range(HOLDING_ROUNDS):
+        found = solve_with(weight)
+        value = found[1]
+        wanted = tail_weight(value, envelope)
+        if max(weight, wanted) <= OVER * min(weight, wanted):
+            break
+        # How the value answers to the weight, as a power of it: more than it never is.
+        power = 0.0
+        if before is not None and before[0] != weight and min(value, before[1]) > 0.0:
+            power = math.log(value / before[1]) / math.log(weight / before[0])
+        before = (weight, value)
+        step = (wanted / weight) ** (1.0 / (1.0 - min(max(power, 0.0), MOST_POWER)))
+        weight = min(max(weight * step, LEAST_WEIGHT), 1.0)
+    return found
 
 
 def norm_of(errors: Floats, norm: str | Criterion) -> float:
@@ -335,8 +393,5 @@ def exchange(
         worst = float(errors.max())
         if worst <= value * (1.0 + 1e-4) + 1e-14:
             break
-        peaks = np.append(True, errors[1:] >= errors[:-1]) & np.append(
-            errors[:-1] >= errors[1:], True
-        )
-        chosen |= peaks & (errors > value)
+        chosen |= peaks(errors) & (errors > value)
     return weights, value, bound

@@ -26,7 +26,7 @@ from limit_surface_ros.decay.least_squares import least_squares_fit, require_sam
 from limit_surface_ros.decay.neutral import neutral_rates
 from limit_surface_ros.decay.noise import LEAST_SAMPLES, is_noisy, noise_level
 from limit_surface_ros.decay.outliers import holds_strays, running_median
-from limit_surface_ros.decay.polish import polished_rates
+from limit_surface_ros.decay.polish import LEAST_DECAYS, polished_rates
 from limit_surface_ros.decay.rates import RateChoice
 from limit_surface_ros.decay.steep import steep_rates
 from limit_surface_ros.decay.tail import Tail, envelope_of, tail_of
@@ -294,8 +294,14 @@ def _fitted(
 def _polished_within(
     response: Target, terms: int, end: float, choice: RateChoice, envelope: float, tell: Progress
 ) -> RateChoice:
-    """Polish rates with the sum held after the end, from those of two starts."""
+    """Polish rates with the sum held after the end, from those of two or three starts.
+
+    Rates that hardly decay meet a record by terms that cancel there and nowhere else.
+    """
     starts = [choice.rates]
+    least = -LEAST_DECAYS / end
+    if float(choice.rates.real.max()) > least:
+        starts.append(np.minimum(choice.rates.real, least) + 1j * choice.rates.imag)
     try:
         starts.append(continued_rates(response, terms, end))
     except SolverError as error:

@@ -15,7 +15,7 @@ import numpy as np
 from limit_surface_ros.decay.targets import PiecewiseLinear, Record
 
 if TYPE_CHECKING:
-    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.checks import Bools, Floats
     from limit_surface_ros.decay.exponential_sum import ExponentialSum
     from limit_surface_ros.decay.targets import Target
 
@@ -107,3 +107,11 @@ def _overshoot(x: ExponentialSum, record: Record, times: Floats) -> float:
     before, gaps = times[:-1:every, np.newaxis], np.diff(times)[::every]
     between = before + np.multiply.outer(gaps, LOOKS_BETWEEN)
     return error_at(x, record, between) - curvature - error_at(x, record, times)
+
+
+def peaks(errors: Floats) -> Bools:
+    """Tell which of some numbers in a row, shape (n,), are no smaller than their neighbours."""
+    rising = np.append(True, errors[1:] >= errors[:-1])
+    falling = np.append(errors[:-1] >= errors[1:], True)
+    found: Bools = rising & falling
+    return found

@@ -17,14 +17,14 @@ import numpy as np
 
 from limit_surface_ros.decay.basis import coefficients_of_weights, count_terms, real_basis
 from limit_surface_ros.decay.exponential_sum import ExponentialSum
-from limit_surface_ros.decay.grids import fit_times
+from limit_surface_ros.decay.grids import fit_times, peaks
 from limit_surface_ros.decay.minimax import solve_minimax
 from limit_surface_ros.decay.rates import RateChoice, judged
 from limit_surface_ros.decay.tail import tail_times, tail_weight
 from limit_surface_ros.errors import SolverError
 
 if TYPE_CHECKING:
-    from limit_surface_ros.checks import Bools, Floats
+    from limit_surface_ros.checks import Floats
     from limit_surface_ros.decay.basis import Complexes
     from limit_surface_ros.decay.targets import Target
 
@@ -54,9 +54,12 @@ PEAK_OF_REFIT, PEAK_OF_STEP = 0.7, 0.3
 
 @dataclass(frozen=True, eq=False)
 class _Point:
+    """Rates, their weights, the largest weighted error, and the largest before the end."""
+
     rates: Complexes
     weights: Floats
     error: float
+    before: float
 
 
 def polished_rates(
@@ -82,7 +85,9 @@ def polished_rates(
         SolverError: Not even the start could be fitted.
     """
     problem = _Problem(response, end, start.rates, envelope, least_decays)
-    point = problem.fitted(start.rates)
+    if envelope is not None:
+        problem.weights[problem.within :] = tail_weight(start.error, envelope)
+    point = problem.balanced(problem.fitted(start.rates))
     radius, stalled, steps = FIRST_RADIUS, 0, 0
     while steps < MOST_STEPS and radius > LEAST_RADIUS and stalled < STALL:
         steps += 1
@@ -101,7 +106,7 @@ def polished_rates(
         elif gain <= FAIR * hope:
             radius *= NARROWED
         if gain > 0.0:
-            point = trial
+            point = problem.balanced(trial)
         if progress is not None:
             progress(steps, point.error)
     parameters = {**start.parameters, "start": start.method, "steps": steps}
@@ -157,10 +162,18 @@ class _Problem:
             worst = float(errors.max())
             if worst <= (1.0 + AGREEMENT) * solution.value:
                 break
-            self.seen |= _peaks(errors) & (errors > PEAK_OF_REFIT * solution.value)
-        if self.envelope is not None:
-            self.weights[self.within :] = tail_weight(before, self.envelope)
-        return _Point(rates, solution.weights, worst)
+            self.seen |= peaks(errors) & (errors > PEAK_OF_REFIT * solution.value)
+        return _Point(rates, solution.weights, worst, before)
+
+    def balanced(self, point: _Point) -> _Point:
+        """Weigh times after the end anew by a point's error, and return the point so judged."""
+        if self.envelope is None:
+            return point
+        weight = tail_weight(point.before, self.envelope)
+        if weight == self.weights[-1]:
+            return point
+        self.weights[self.within :] = weight
+        return self.fitted(point.rates)
 
     def step(self, point: _Point, radius: float) -> tuple[_Point, float]:
         """Return the point after one linear program, and the error that it predicts.
@@ -171,8 +184,8 @@ class _Problem:
         """
         x = ExponentialSum.from_weights(point.rates, point.weights)
         errors = (self.target - x(self.times)) * self.weights
-        peaks = _peaks(np.abs(errors)) & (np.abs(errors) > PEAK_OF_STEP * point.error)
-        seen = self.base | peaks | np.roll(peaks, 2) | np.roll(peaks, -2)
+        high = peaks(np.abs(errors)) & (np.abs(errors) > PEAK_OF_STEP * point.error)
+        seen = self.base | high | np.roll(high, 2) | np.roll(high, -2)
         self.seen = seen
         times = self.times[seen]
         basis = real_basis(point.rates, times)
@@ -198,10 +211,3 @@ class _Problem:
         rates[is_pair] += 1j * change[len(point.rates) :]
         rates = np.minimum(rates.real, -self.least_decay) + 1j * np.abs(rates.imag)
         return self.fitted(rates), solution.value
-
-
-def _peaks(errors: Floats) -> Bools:
-    rising = np.append(True, errors[1:] >= errors[:-1])
-    falling = np.append(errors[:-1] >= errors[1:], True)
-    peaks: Bools = rising & falling
-    return peaks

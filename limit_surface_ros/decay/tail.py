@@ -38,6 +38,8 @@ LEAST_WEIGHT = 1e-9
 _GRADED = np.concatenate([1.0 + np.geomspace(1e-3, 0.2, 12), np.geomspace(1.25, 9.0, 24)])
 _GRADED_TO, _POINTS_A_DECADE = 9.0, 28
 _EVEN_TO, _POINTS_A_RADIAN, _MOST_EVEN = 2.0, 1.5, 2000
+# How many times are looked at between them.
+_LOOKS_A_RADIAN, _MOST_LOOKS, _GRADED_LOOKS = 4.0, 20_000, 801
 
 
 @dataclass(frozen=True)
@@ -122,15 +124,35 @@ def tail_weight(error: float, envelope: float) -> float:
 def tail_times(rates: Complexes, end: float) -> Floats:
     """Return times after the end [s] at which a sum of these rates is to be held.
 
-    As many slow terms as there are may together rise until each has decayed so many times.
+    As many slow terms as there are may together rise like t^(terms - 1) exp(-a t), until each has
+    decayed so many times, and are not small before each has decayed some twice as often.
     """
     fastest = float(np.abs(rates.imag).max(initial=0.0))
     count = int(np.clip(_POINTS_A_RADIAN * end * fastest, 2, _MOST_EVEN))
     even = np.linspace(1.0, _EVEN_TO, count + 1)[1:]
-    last = count_terms(rates) / (end * float(-rates.real[rates != 0.0].max(initial=-np.inf)))
+    last = _vanished(rates, end)
     later = np.zeros(0)
     if last > _GRADED_TO:
         count = 1 + int(np.ceil(_POINTS_A_DECADE * np.log10(last / _GRADED_TO)))
         later = np.geomspace(_GRADED_TO, last, count)
     times: Floats = np.unique(np.concatenate([_GRADED, even, later])) * end
     return times
+
+
+def closer_tail_times(rates: Complexes, end: float) -> Floats:
+    """Return times after the end [s] at which a held sum is looked at, until it is small.
+
+    They resolve the fastest swing, unless that lasts for thousands of periods.
+    """
+    last = max(_vanished(rates, end), _EVEN_TO)
+    fastest = float(np.abs(rates.imag).max(initial=0.0))
+    count = int(np.clip(_LOOKS_A_RADIAN * end * fastest * (last - 1.0), 2, _MOST_LOOKS))
+    graded = np.geomspace(1.0, last, _GRADED_LOOKS)
+    times: Floats = np.union1d(graded, np.linspace(1.0, last, count + 1)) * end
+    return times
+
+
+def _vanished(rates: Complexes, end: float) -> float:
+    """Return when all terms are small, however they cancel, in parts of the end."""
+    decay = float(-rates.real[rates != 0.0].max(initial=-np.inf))
+    return (2 * count_terms(rates) + 8) / (end * decay)
