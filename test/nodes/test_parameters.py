@@ -12,8 +12,9 @@ pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not b
 
 from limit_surface_interfaces.msg import ErrorCode
 from limit_surface_interfaces.srv import WrenchToTwist
-from rcl_interfaces.msg import ParameterType
-from rcl_interfaces.srv import SetParameters
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
@@ -119,6 +120,47 @@ def test_files_and_default_change_together_in_any_order_of_one_request(
     given = [parameter.to_parameter_msg() for parameter in others]
     answer = load(SetParameters.Request(parameters=given))
     assert [result.successful for result in answer.results] == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "told"),
+    [
+        ("normal_forse", 3, "'normal_forse' is not known here; did you mean 'normal_force'?"),
+        ("", 3, "parameter '' is not known here"),
+        ("x" * 1_000_000, 3, "1000000 characters"),
+        # rclpy answers nothing to a type that it does not know.
+        ("normal_force", 77, "normal_force: 77 is not a valid"),
+    ],
+)
+def test_what_is_no_parameter_is_said_to_be_none(ros, client_node, node, name, kind, told):
+    wrong = ParameterMessage(name=name, value=ParameterValue(type=kind, double_value=2.0))
+    right = Parameter("input_timeout", value=2.0).to_parameter_msg()
+    one_by_one = ros.client(client_node, SetParameters, "/limit_surface/set_parameters")
+    answer = one_by_one(SetParameters.Request(parameters=[wrong, right]))
+    assert [result.successful for result in answer.results] == [False, True]
+    assert told in answer.results[0].reason
+    assert len(answer.results[0].reason) < 400
+    at_once = ros.client(
+        client_node, SetParametersAtomically, "/limit_surface/set_parameters_atomically"
+    )
+    right = Parameter("input_timeout", value=3.0).to_parameter_msg()
+    answer = at_once(SetParametersAtomically.Request(parameters=[right, wrong]))
+    assert not answer.result.successful
+    assert told in answer.result.reason
+    assert node.values["input_timeout"] == 2.0
+
+
+def test_thousands_of_parameters_in_one_request_are_answered(ros, client_node, node):
+    load = ros.client(client_node, SetParameters, "/limit_surface/set_parameters")
+    # With the square of their number this would take minutes.
+    unknown = [Parameter(f"p{place}", value=1.0).to_parameter_msg() for place in range(10_000)]
+    answer = load(SetParameters.Request(parameters=unknown))
+    assert not any(result.successful for result in answer.results)
+    assert "'p9999'" in answer.results[-1].reason
+    again = [Parameter("normal_force", value=1.0 + n).to_parameter_msg() for n in range(10_000)]
+    answer = load(SetParameters.Request(parameters=again))
+    assert all(result.successful for result in answer.results)
+    assert node.values["normal_force"] == 10_000.0
 
 
 def test_a_default_that_other_files_do_not_hold_is_refused_with_the_way_to_change_both(

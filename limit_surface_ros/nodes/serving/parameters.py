@@ -13,7 +13,7 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
-from rclpy.exceptions import InvalidParameterTypeException, ParameterNotDeclaredException
+from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.parameter import Parameter
 
 from limit_surface_ros.errors import LimitSurfaceError, RangeError, UnavailableError, shortened
@@ -23,7 +23,8 @@ from limit_surface_ros.nodes.serving.settings import Setting
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable
 
-    from rcl_interfaces.srv import SetParameters
+    from rcl_interfaces.msg import Parameter as ParameterMessage
+    from rcl_interfaces.srv import SetParameters, SetParametersAtomically
     from rclpy.node import Node
 
     # Gets the values as they would be; raises to refuse them, returns what makes them count.
@@ -96,6 +97,8 @@ class Parameters:
         for service in node.services:
             if service.service_name.endswith("/set_parameters"):
                 service.callback = self._set
+            elif service.service_name.endswith("/set_parameters_atomically"):
+                service.callback = self._set_atomically
 
     def __getitem__(self, name: str) -> Any:
         """Return the present value."""
@@ -151,22 +154,55 @@ class Parameters:
         self, request: SetParameters.Request, response: SetParameters.Response
     ) -> SetParameters.Response:
         """Set parameters one by one, but those that depend on each other at once."""
-        given = [Parameter.from_parameter_msg(message) for message in request.parameters]
         results: dict[int, SetParametersResult] = {}
-        for place, parameter in enumerate(given):
-            if place in results:
-                continue
-            together = {parameter.name}.union(
-                *(names for names in self._sets if parameter.name in names)
-            )
-            places = [i for i, other in enumerate(given) if other.name in together]
+        together: dict[str | frozenset[str], list[tuple[int, Parameter]]] = {}
+        # Whom somebody may have meant is looked for where few are asked for: it takes a while.
+        known = self._settings if len(request.parameters) <= len(self._settings) else ()
+        for place, message in enumerate(request.parameters):
             try:
-                result = self._node.set_parameters_atomically([given[i] for i in places])
-            except ParameterNotDeclaredException as error:
-                result = SetParametersResult(successful=False, reason=str(error))
-            results |= dict.fromkeys(places, result)
-        response.results = [results[place] for place in range(len(given))]
+                parameter = self._understood(message, known)
+            except RangeError as error:
+                results[place] = SetParametersResult(successful=False, reason=str(error))
+                continue
+            name = parameter.name
+            key = next((names for names in self._sets if name in names), name)
+            together.setdefault(key, []).append((place, parameter))
+        for group in together.values():
+            result = self._node.set_parameters_atomically([parameter for _, parameter in group])
+            results |= {place: result for place, _ in group}
+        response.results = [results[place] for place in range(len(request.parameters))]
         return response
+
+    def _set_atomically(
+        self,
+        request: SetParametersAtomically.Request,
+        response: SetParametersAtomically.Response,
+    ) -> SetParametersAtomically.Response:
+        """Set all parameters or none."""
+        try:
+            given = [self._understood(each, self._settings) for each in request.parameters]
+        except RangeError as error:
+            response.result = SetParametersResult(successful=False, reason=str(error))
+        else:
+            response.result = self._node.set_parameters_atomically(given)
+        return response
+
+    def _understood(self, message: ParameterMessage, known: Iterable[str]) -> Parameter:
+        """Return a parameter of this node from its message; rclpy answers nothing to some.
+
+        Args:
+            message: The message.
+            known: Names among which to look for the one that was meant.
+
+        Raises:
+            RangeError: The node has none of that name, or the value is of no known type.
+        """
+        if not self._node.has_parameter(message.name):
+            raise RangeError(_unknown(message.name, known))
+        try:
+            return Parameter.from_parameter_msg(message)
+        except ValueError as error:
+            raise RangeError(f"{message.name}: {error}") from None
 
     def _fit_types(self, parameters: list[Parameter]) -> list[Parameter]:
         """Take whole numbers where others are wanted, and a text where a list of them is.
@@ -297,10 +333,15 @@ def _warn_of_unknown(node: Node, known: Iterable[str]) -> None:
     for name in given:
         if node.has_parameter(name):
             continue
-        sentence = f"parameter {shortened(name)!r} is not known here and is ignored"
-        like = difflib.get_close_matches(name, known, n=1, cutoff=0.75)
-        meant = f"; did you mean {like[0]!r}?" if like else ""
-        node.get_logger().warning(f"{sentence}{meant}")
+        node.get_logger().warning(_unknown(name, known, " and is ignored"))
+
+
+def _unknown(name: str, known: Iterable[str], and_so: str = "") -> str:
+    """Return that no parameter has a name, with the one that may have been meant."""
+    shown = shortened(name)
+    like = difflib.get_close_matches(shown, known, n=1, cutoff=0.75)
+    meant = f"; did you mean {like[0]!r}?" if like else ""
+    return f"parameter {shown!r} is not known here{and_so}{meant}"
 
 
 def _plain(value: Any) -> Any:
