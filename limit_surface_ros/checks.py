@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from limit_surface_ros.errors import NotFiniteError, RangeError, ShapeError, ZeroVectorError
+from limit_surface_ros.errors import (
+    LONGEST_NAME,
+    NotFiniteError,
+    RangeError,
+    ShapeError,
+    ZeroVectorError,
+    shortened,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -151,3 +158,20 @@ def as_positive(name: str, value: float) -> float:
     if not 0.0 < number < float("inf"):
         raise RangeError(f"{name} must be a finite number above 0, got {number}")
     return number
+
+
+def as_name(what: str, text: str) -> str:
+    """Return `text` if it can name something in requests, lists, logs and headers.
+
+    Raises:
+        RangeError: It is empty, is longer than `LONGEST_NAME`, or holds line breaks or other
+            characters that cannot be printed.
+    """
+    if not text.strip():
+        raise RangeError(f"{what} must not be empty")
+    if len(text) > LONGEST_NAME or not text.isprintable():
+        raise RangeError(
+            f"{what} must have at most {LONGEST_NAME} characters, all of which can be printed, "
+            f"got {shortened(repr(text))}"
+        )
+    return text

@@ -102,8 +102,8 @@ def read_contact(path: str | Path) -> ContactModel:
     section = read_yaml(path)
     _refuse_models(section)
     section.choice("schema", [SCHEMA])
-    name = section.text("name")
-    frame_id = section.text("frame_id", "object")
+    name = section.name("name")
+    frame_id = section.name("frame_id", "object")
     reference = _read_reference_point(section)
     if "points" in section:
         model = _read_points(section, name, frame_id, reference)

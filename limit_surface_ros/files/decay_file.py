@@ -36,7 +36,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limit_surface_ros.checks import as_floats
+from limit_surface_ros.checks import as_floats, as_name
 from limit_surface_ros.decay.delay.pieces import PiecewisePolynomial
 from limit_surface_ros.decay.delay.system import DelaySystem
 from limit_surface_ros.decay.exponential_sum import ExponentialSum
@@ -74,8 +74,8 @@ class DecayModel:
         noise: Standard deviation of the noise of the record that was fitted; 0 if not stated.
 
     Raises:
-        RangeError: The name is empty, the span is not 0 <= start < end, the error is negative, or
-            the sum does not decay.
+        RangeError: The name is empty, too long or not printable, the span is not 0 <= start < end,
+            the error is negative, or the sum does not decay.
     """
 
     name: str
@@ -90,8 +90,7 @@ class DecayModel:
 
     def __post_init__(self) -> None:
         """Check what the sum itself has not checked."""
-        if not self.name.strip():
-            raise RangeError("a decay model needs a name")
+        as_name("name", self.name)
         start, end = (float(t) for t in self.time_span)
         if not 0.0 <= start < end < float("inf"):
             raise RangeError(f"time_span must be 0 <= start < end, got {start} and {end}")
@@ -139,7 +138,7 @@ def read_decay_model(path: str | Path) -> DecayModel:
     top.choice("schema", [SCHEMA])
     _refuse_surfaces(top)
     top.choice("kind", [KIND])
-    name = top.text("name")
+    name = top.name("name")
     rates, coefficients = (_complexes(top, key) for key in ("rates", "coefficients"))
     span = top.array("time_span", (2,))
     norm = top.text("norm")

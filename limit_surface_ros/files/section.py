@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limit_surface_ros.checks import LARGEST
-from limit_surface_ros.errors import FileError, LimitSurfaceError, shortened
+from limit_surface_ros.checks import LARGEST, as_name
+from limit_surface_ros.errors import FileError, LimitSurfaceError, RangeError, shortened
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping
@@ -80,6 +80,16 @@ class Section:
             return default
         if not isinstance(value, str) or not value.strip():
             raise self.error(key, f"must be {accepted}, got {_shown(value)}")
+        return value
+
+    def name(self, key: str, default: Any = _REQUIRED) -> Any:
+        """Return a text that can name something (`checks.as_name`), or the default as it is."""
+        value = self.text(key, default)
+        if value is not default:
+            try:
+                as_name(key, value)
+            except RangeError as error:
+                raise self.error(key, str(error).removeprefix(f"{key} ")) from None
         return value
 
     def choice(self, key: str, accepted: Collection[Any], default: Any = _REQUIRED) -> Any:

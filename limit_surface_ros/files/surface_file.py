@@ -18,8 +18,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from limit_surface_ros.checks import as_positive
-from limit_surface_ros.errors import DataError, RangeError
+from limit_surface_ros.checks import as_name, as_positive
+from limit_surface_ros.errors import DataError
 from limit_surface_ros.files.outline_section import outline_values, read_outline
 from limit_surface_ros.files.section import Section, place_errors
 from limit_surface_ros.files.yaml_reader import read_yaml, write_yaml
@@ -55,7 +55,8 @@ class SurfaceModel:
         outline: Of the body in that frame, which pushers touch; None if it is not known.
 
     Raises:
-        RangeError: The name or the frame is empty, or the normal force not above zero.
+        RangeError: The name or the frame is empty, too long or not printable, or the normal force
+            not above zero.
     """
 
     name: str
@@ -69,8 +70,7 @@ class SurfaceModel:
     def __post_init__(self) -> None:
         """Check what the surface itself does not know."""
         for key in ("name", "frame_id"):
-            if not getattr(self, key).strip():
-                raise RangeError(f"{key} must not be empty")
+            as_name(key, getattr(self, key))
         if self.normal_force is not None:
             as_positive("normal_force", self.normal_force)
 
@@ -149,9 +149,9 @@ def read_surface_model(path: str | Path) -> SurfaceModel:
     arrays = _read_arrays(section, kind.arrays)
     surface = place_errors(section, kind.kind, lambda: kind.of_arrays(arrays, scaling))
     model = SurfaceModel(
-        name=section.text("name"),
+        name=section.name("name"),
         surface=surface,
-        frame_id=section.text("frame_id"),
+        frame_id=section.name("frame_id"),
         reference_point=(float(reference_point[0]), float(reference_point[1])),
         normal_force=section.number("normal_force", None, above=0.0),
         fit=history.values,

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A surface model written and read back is the same; a file that is not one says why."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -106,3 +108,18 @@ def test_a_model_without_a_name_or_with_a_weight_of_zero_is_refused():
         SurfaceModel(" ", surface)
     with pytest.raises(RangeError, match="normal_force must be a finite number above 0"):
         SurfaceModel("part", surface, normal_force=0.0)
+
+
+@pytest.mark.parametrize("text", ["n" * 201, "line\nbreak", "bell\a"])
+def test_names_that_lists_and_logs_cannot_show_are_refused(tmp_path, text):
+    surface = PowerSum(np.eye(3)[None], [1.0])
+    with pytest.raises(RangeError, match="name must have at most 200 characters, all of which"):
+        SurfaceModel(text, surface)
+    with pytest.raises(RangeError, match="frame_id must have at most 200"):
+        SurfaceModel("part", surface, frame_id=text)
+    path = tmp_path / "part.yaml"
+    write_surface_model(SurfaceModel("part", surface), path)
+    path.write_text(path.read_text().replace("name: part", f"name: {json.dumps(text)}"))
+    with pytest.raises(FileError, match=r"part\.yaml: name: must have at most 200") as raised:
+        read_surface_model(path)
+    assert len(str(raised.value)) < 1000

@@ -11,7 +11,7 @@ from geometry_msgs.msg import PoseStamped
 from limit_surface_interfaces.srv import LinearisePush, SimulatePush, SimulatePushes
 
 from limit_surface_ros.checks import as_floats
-from limit_surface_ros.errors import DataError, FrameError, RangeError, ShapeError
+from limit_surface_ros.errors import DataError, FrameError, RangeError, ShapeError, shortened
 from limit_surface_ros.motion.linear_push import INPUTS, linearise_push
 from limit_surface_ros.motion.outcomes import MODES
 from limit_surface_ros.motion.outline import Polygon
@@ -168,7 +168,8 @@ def outline_of(model: SurfaceModel, request: Any) -> Outline:
         return Polygon([(point.x, point.y) for point in points])
     if model.outline is None:
         raise DataError(
-            f"model {model.name!r} has no outline: give one with the request, or in its file"
+            f"model {shortened(repr(model.name))} has no outline: give one with the request, or "
+            "in its file"
         )
     return model.outline
 
@@ -205,8 +206,8 @@ def _tips(request: SimulatePush.Request) -> tuple[Floats, Any]:
     for header in (path.header, *(pose.header for pose in path.poses)):
         if header.frame_id not in ("", frame):
             raise FrameError(
-                f"tip_path is in frame {header.frame_id!r}, and the request in {frame!r}: give "
-                "both in one that stands still"
+                f"tip_path is in frame {shortened(repr(header.frame_id))}, and the request in "
+                f"{shortened(repr(frame))}: give both in one that stands still"
             )
     places = as_floats(
         "tip_path", [(pose.pose.position.x, pose.pose.position.y) for pose in path.poses]
