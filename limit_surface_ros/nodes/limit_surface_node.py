@@ -107,7 +107,8 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
         self.learner: learning.Learner | None = None
         super().__init__(NAME, SETTINGS, read_surface_model, prepare_surface, **options)
         self._list = ModelList(self._info)
-        self.input = PlanarInput(self.values, Frames(self, self.values, buffer), self.report)
+        moved = Frames(self, self.values, buffer)
+        self.input = PlanarInput(self.values, moved, self.report, self.host)
         self.batches = Batches(self.endpoints)
         self.markers = SurfaceMarkers(self, self._present)
         self.push_markers = PushMarkers(self)

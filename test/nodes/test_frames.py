@@ -12,10 +12,11 @@ import pytest
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
 
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import PoseStamped, TransformStamped
 from limit_surface_interfaces.msg import ErrorCode
 from limit_surface_interfaces.srv import (
     ListModels,
+    SimulatePush,
     TwistsToWrenches,
     TwistToWrench,
     WrenchesToTwists,
@@ -173,8 +174,24 @@ def test_two_robots_and_a_perceived_object_need_no_other_files(ros, client_node,
     assert ask("box", "right/object").error_code == ErrorCode.NONE
     frames = [info.frame_id for info in listed(ListModels.Request()).models]
     assert frames == ["right/object", "box_12"]
-    for wrong in (["crate"], ["=a"], ["a="], ["a=b", "a=c"]):
+    for wrong in (["crate"], ["=a"], ["a="], ["a=b", "a=c"], ["a= b"], ["a=b\nc"]):
         assert not node.set_parameters([Parameter("frame_ids", value=wrong)])[0].successful
+
+
+def test_frames_are_given_to_models_of_any_name_and_to_what_is_learnt_of_them(
+    ros, client_node, model_file
+):
+    names = ["a=b", "Kiste groß 2", "box", "box_learnt"]
+    paths = []
+    for name in names:
+        paths.append(model_file(name)[1])
+    frames = ["a=b=one", "Kiste groß 2=two", "box=three", "bx=four"]
+    node = ros.add(LimitSurfaceNode, files=paths, parameters={"frame_ids": frames})
+    listed = ros.client(client_node, ListModels, "/limit_surface/list_models")
+    served = {info.name: info.frame_id for info in listed(ListModels.Request()).models}
+    assert served == dict(zip(names, ["one", "two", "three", "three"], strict=True))
+    # One of no model that is loaded is told of.
+    assert node.health.reported["frame of no model"] == 1
 
 
 def test_a_slash_before_a_frame_is_said_to_be_the_matter(serve):
@@ -188,6 +205,18 @@ def test_a_very_long_name_is_not_repeated_whole(serve):
     assert answer.error_code == ErrorCode.UNKNOWN_FRAME
     assert len(answer.error_msg) < 1000
     assert len(node.health.last_error) < 1000
+
+
+def test_a_very_long_frame_of_a_path_is_not_repeated_whole(ros, client_node, serve):
+    serve()
+    call = ros.client(client_node, SimulatePush, "/limit_surface/simulate_push")
+    asked = SimulatePush.Request()
+    asked.header.frame_id = "x" * 1_000_000
+    asked.tip_path.poses = [PoseStamped(), PoseStamped()]
+    asked.tip_path.header.frame_id = "y" * 1_000_000
+    answer = call(asked)
+    assert answer.error_code == ErrorCode.UNKNOWN_FRAME
+    assert len(answer.error_msg) < 1000
 
 
 def test_a_frame_without_a_transform_is_refused_with_both_named(serve):

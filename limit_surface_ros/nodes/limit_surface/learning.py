@@ -28,6 +28,7 @@ from limit_surface_ros.files.surface_file import (
 )
 from limit_surface_ros.nodes.limit_surface.measurement_pairs import SAME_TIME, MeasurementPairs
 from limit_surface_ros.nodes.messages import convert
+from limit_surface_ros.nodes.messages.planar_input import LEARNT
 from limit_surface_ros.nodes.serving.settings import Setting
 
 if TYPE_CHECKING:
@@ -68,7 +69,6 @@ SETTINGS = (
         read_only=True,
     ),
 )
-SUFFIX = "_learnt"
 # Segments that wait to be learnt.
 _SEGMENTS = 100
 # Pushes of which diagnostics tell how well they were predicted.
@@ -105,7 +105,7 @@ class Learner:
 
         self._node = node
         self._prior: SurfaceModel = node.host.models[node.values["learn_prior"]]
-        self.name = self._prior.name + SUFFIX
+        self.name = self._prior.name + LEARNT
         self._path = node.values["learn_file"]
         self._forgetting = "blend" if node.values["learn_forgetting"] == "blend" else 1.0
         stored = self._stored()

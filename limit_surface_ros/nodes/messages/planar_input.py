@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from limit_surface_ros.checks import as_name
 from limit_surface_ros.errors import RangeError, shortened
 from limit_surface_ros.nodes.messages import convert
 from limit_surface_ros.nodes.serving.settings import Setting
@@ -28,25 +29,39 @@ if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.files.surface_file import SurfaceModel
     from limit_surface_ros.nodes.messages.frames import Frames
+    from limit_surface_ros.nodes.models.model_host import ModelHost
     from limit_surface_ros.nodes.serving.parameters import Parameters, Values
     from limit_surface_ros.surface.base import LimitSurface
 
 
+# What is learnt of a model is of the same body, and named by this behind the model's name.
+LEARNT = "_learnt"
+
+
 def frames_by_model(texts: Iterable[str]) -> dict[str, str]:
-    """Return the frames that 'model=frame' texts give to models.
+    """Return the frames that 'model=frame' texts give to models; the last = divides the two.
 
     Raises:
-        RangeError: A text is not understood, or a model is named twice.
+        RangeError: A text is not understood, a frame begins or ends with a space, or a model is
+            named twice.
     """
     frames: dict[str, str] = {}
     for text in texts:
-        model, equals, frame = text.partition("=")
-        if not (equals and model.strip() and frame.strip()):
-            raise RangeError(f"{shortened(text)!r}: accepted is 'model=frame'")
+        model, _, frame = text.rpartition("=")
+        if not (model.strip() and frame.strip()) or frame != frame.strip():
+            raise RangeError(
+                f"{shortened(text)!r}: accepted is 'model=frame', no space about the ="
+            )
+        as_name("frame", frame)
         if model in frames:
             raise RangeError(f"model {shortened(model)!r} is given two frames")
         frames[model] = frame
     return frames
+
+
+def _check_prefix(text: str) -> None:
+    if text:
+        as_name("prefix", text)
 
 
 SETTINGS = (
@@ -54,12 +69,14 @@ SETTINGS = (
         "frame_prefix",
         "",
         "Put before the frame_id of every model file, such as 'left/' for the left of two robots",
+        check=_check_prefix,
     ),
     Setting(
         "frame_ids",
         [],
         "Frames of single models in place of those of their files, each 'model=frame', such as "
-        "'box=box_12' for a perceived object; frame_prefix is not put before them",
+        "'box=box_12' for a perceived object, of what is learnt of them too; frame_prefix is not "
+        "put before them",
         check=frames_by_model,
     ),
     Setting(
@@ -123,7 +140,8 @@ class InputPolicy:
 
     def frame_of(self, model: SurfaceModel) -> str:
         """Return the frame in which a model is served."""
-        return self.frames.get(model.name) or self.frame_prefix + model.frame_id
+        frame = self.frames.get(model.name) or self.frames.get(model.name.removesuffix(LEARNT))
+        return frame or self.frame_prefix + model.frame_id
 
     def surface_of(self, model: SurfaceModel, pressing: float | None = None) -> LimitSurface:
         """Return a model's surface under the force that presses the body down.
@@ -177,16 +195,22 @@ class PlanarInput:
         parameters: The node's parameters, which include `SETTINGS`.
         frames: Transforms to the models' frames.
         report: Told of what is left out and not small: a key and a sentence.
+        host: Whose `models` are served.
     """
 
     policy: InputPolicy
 
     def __init__(
-        self, parameters: Parameters, frames: Frames, report: Callable[[str, str], None]
+        self,
+        parameters: Parameters,
+        frames: Frames,
+        report: Callable[[str, str], None],
+        host: ModelHost[SurfaceModel],
     ) -> None:
         """Follow the parameters."""
         self.frames = frames
         self._report = report
+        self._host = host
         parameters.on_change([setting.name for setting in SETTINGS], self._prepare)
 
     async def wrench(self, model: SurfaceModel, stamped: WrenchStamped) -> Planar:
@@ -325,6 +349,14 @@ class PlanarInput:
 
         def apply() -> None:
             self.policy = policy
+            served = {model.name.removesuffix(LEARNT) for model in self._host.models}
+            for name in policy.frames:
+                if name.removesuffix(LEARNT) not in served:
+                    self._report(
+                        "frame of no model",
+                        f"frame_ids names a model {shortened(repr(name))}, and none of that name "
+                        "is loaded",
+                    )
 
         return apply
 
