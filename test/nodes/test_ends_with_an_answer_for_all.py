@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from limit_surface_ros.nodes.messages import convert
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.scaling import Scaling
 from node_helpers import Program, processor_ticks, wrench_message
-from process_helpers import WAIT
+from process_helpers import WAIT, started_python
 
 BATCHES = 20
 
@@ -70,6 +71,49 @@ def started_with(hang_up, *options):
         return Program("limit_surface_node", "--ros-args", *options)
     finally:
         signal.signal(signal.SIGHUP, before)
+
+
+# A node whose tool's transform never comes, and whose clock, being simulated, stands still.
+WAITS = f"""
+import sys
+sys.path.insert(0, {str(Path(__file__).parents[1])!r})
+from transform_helpers import Buffer
+from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
+from limit_surface_ros.nodes.serving import spin
+buffer = Buffer()
+buffer.set_transform(1, 0.0)
+sys.exit(spin.run(lambda: [LimitSurfaceNode(buffer=buffer)], {{}}, "", sys.argv))
+"""
+
+
+def test_what_waits_for_a_transform_at_a_signal_is_refused_at_once(ros, client_node, model_file):
+    options = [f"model_files:=['{model_file()[1]}']", "transform_timeout:=60.0"]
+    options += ["use_sim_time:=true"]
+    process = started_python(
+        "-c",
+        WAITS,
+        "--ros-args",
+        *(part for option in options for part in ("-p", option)),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+    )
+    client = client_node.create_client(WrenchToTwist, "/limit_surface/wrench_to_twist")
+    assert client.wait_for_service(timeout_sec=WAIT)
+    known = wrench_message([9, 0, 0])
+    while not ros.done(client.call_async(WrenchToTwist.Request(wrench=known)), 2.0):
+        pass
+    late = WrenchToTwist.Request(wrench=wrench_message([9, 0, 0], frame="tool"))
+    waiting = [client.call_async(late) for _ in range(5)]
+    # What is asked after them is answered while they wait: they have all come.
+    assert ros.done(client.call_async(WrenchToTwist.Request(wrench=known)), WAIT)
+    assert not any(future.done() for future in waiting)
+    process.send_signal(signal.SIGTERM)
+    output, _ = process.communicate(timeout=WAIT)
+    assert process.returncode == 0, output
+    for future in waiting:
+        assert ros.done(future, WAIT)
+        assert future.result().error_code == ErrorCode.UNAVAILABLE
+        assert "ending" in future.result().error_msg
 
 
 def test_a_terminal_that_is_closed_ends_the_node_as_sigterm_does(ros, client_node, model_file):

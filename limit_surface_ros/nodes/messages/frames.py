@@ -96,13 +96,13 @@ class Frames:
     """Transforms from message frames to model frames.
 
     Args:
-        node: The node; tf2's listener subscribes through it.
+        node: The node, with its `endpoints`; tf2's listener subscribes through it.
         parameters: Its parameters, which include `SETTINGS`.
         buffer: What has the methods of a `tf2_ros.Buffer` and is filled by somebody else; None:
             one of tf2's own, if `use_tf` is set and tf2_ros is installed.
     """
 
-    def __init__(self, node: Node, parameters: Parameters, buffer: Any = None) -> None:
+    def __init__(self, node: Any, parameters: Parameters, buffer: Any = None) -> None:
         """Read the static transforms and start listening to tf2 where it is installed."""
         self._node = node
         self._parameters = parameters
@@ -121,6 +121,7 @@ class Frames:
             autostart=False,
         )
         parameters.on_change(["static_transforms"], self._prepare)
+        node.endpoints.when_ending.append(self._refuse_next)
 
     @property
     def waiting(self) -> int:
@@ -206,6 +207,11 @@ class Frames:
             await waiting
         finally:
             self._waits.remove(wait)
+
+    def _refuse_next(self, error: Exception) -> None:
+        """Have the input that has waited longest refused."""
+        if self._waits:
+            self._waits[0].waiting.settle(error)
 
     def _end_waits(self) -> None:
         """Settle the waits whose transform has come, and those that were in vain."""
