@@ -51,6 +51,8 @@ MOST_DEVIATIONS, LEAST_TESTED = 4.0, 8
 SLOW_WAVES, MOST_SLOW, DOUBTFUL, LEAST_LEFT = 4, 28.5, 13.3, 0.02
 # Deviations in a bound, and the last samples that a bound is not below if nothing fits.
 BOUND_DEVIATIONS, LAST_SAMPLES = 4.0, 20
+# Time [s] after which bounds are those of then.
+LATEST = 1e100
 # Residuals before a sample that show whether it stands alone.
 NEIGHBOURS = 5
 
@@ -343,6 +345,8 @@ class ResponseEstimator:
         Four standard deviations of the mixture of all families, and the distance to each that
         is credible; where nothing fits, or hardly, at least the largest of the last samples.
         """
+        # What is left later is the constant; products with later times would overflow.
+        times = np.minimum(times, LATEST)
         centre = self.learnt(times)
         fits = [fit for fit in self._fits if fit.samples == self._best.samples] or [self._best]
         least = min(fit.evidence for fit in fits)

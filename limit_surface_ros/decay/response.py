@@ -15,7 +15,7 @@ import numpy as np
 
 from limit_surface_ros.checks import as_floats
 from limit_surface_ros.decay.estimation import ResponseEstimator
-from limit_surface_ros.errors import NoOnsetError
+from limit_surface_ros.errors import NoOnsetError, RangeError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 # x(0) below this share of the sum of |c| is rounding and no value to scale by.
 SMALLEST_START = 1e-12
+# A measurement of so many onsets is of something else, and its squares are beyond numbers.
+LARGEST_FRACTION = 1e12
 
 
 def onset_value(x: ExponentialSum) -> float:
@@ -155,8 +157,14 @@ class Response:
 
         Raises:
             NotFiniteError: A number is NaN or infinite.
-            RangeError: The time is before the onset or not after that of the measurement before.
+            RangeError: The time is before the onset or not after that of the measurement before,
+                or the fraction is larger than `LARGEST_FRACTION`.
         """
+        if abs(fraction) > LARGEST_FRACTION:
+            raise RangeError(
+                f"a measurement is {fraction:.3g} times the onset; at most {LARGEST_FRACTION:g} "
+                "times is accepted"
+            )
         return self._estimator.add(time, fraction * self.start)
 
     def forget(self) -> None:

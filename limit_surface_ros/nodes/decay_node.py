@@ -143,7 +143,7 @@ class DecayNode(ModelNode[DecayModel]):
         )
         self._frames = frames.Frames(self, self.values, buffer)
         self.batches = Batches(self.endpoints)
-        self.input = PlanarInput(self.values, self._frames, self.report)
+        self.input = PlanarInput(self.values, self._frames, self.report, self.surfaces)
         self.onset: Onset | None = None
         self._forecast_time = 0
         self._forecast_samples = 0
@@ -159,6 +159,7 @@ class DecayNode(ModelNode[DecayModel]):
             self.endpoints.add_output(Vector3Stamped, "value", depth=100),
             self._advance,
             self._forget_measurements,
+            self.endpoints.refuse,
         )
         self._time_left = self.endpoints.add_output(
             TimeLeft, "time_left", depth=100, unbounded=("time_left", "end_time")

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -71,5 +72,6 @@ class Onset:
         along = self._weights * self.load
         measured = self._weights * load
         fraction = float(along @ measured)
-        self.off_axis = float(np.linalg.norm(measured - fraction * along))
+        # The squares of a norm may overflow: a wrong sensor tells what is beyond all sense.
+        self.off_axis = math.hypot(*(measured - fraction * along))
         return fraction

@@ -11,6 +11,7 @@ from geometry_msgs.msg import Vector3Stamped, WrenchStamped
 from rclpy.clock import JumpThreshold
 from rclpy.duration import Duration
 
+from limit_surface_ros.errors import LimitSurfaceError
 from limit_surface_ros.nodes.messages.convert import fill_stamp
 
 if TYPE_CHECKING:
@@ -89,6 +90,7 @@ class OnsetStream:
         values: Publisher of Vector3Stamped.
         advanced: Told the node time [ns] when messages have gone out.
         jumped_back: Told when node time was set back, before the stream goes on.
+        refused: Told what could not be published, and why.
     """
 
     def __init__(
@@ -98,6 +100,7 @@ class OnsetStream:
         values: Output,
         advanced: Callable[[int], None],
         jumped_back: Callable[[], None],
+        refused: Callable[[str, Exception], object],
     ) -> None:
         """Wait for an onset."""
         self._clock = node.get_clock()
@@ -105,6 +108,7 @@ class OnsetStream:
         self._values = values
         self._advanced = advanced
         self._jumped_back = jumped_back
+        self._refused = refused
         self._wrench = WrenchStamped()
         self._value = Vector3Stamped()
         self._onset: Onset | None = None
@@ -156,10 +160,15 @@ class OnsetStream:
     def _publish_due(self) -> None:
         now = self._now()
         offsets = [o for o in self._schedule.due(now) if o * 1e-9 <= self._end]
-        if offsets:
-            self._publish(offsets)
-            self._advanced(now)
-        self._aim()
+        try:
+            if offsets:
+                self._publish(offsets)
+                self._advanced(now)
+        except LimitSurfaceError as error:
+            # A number that is not finite is not sent; the stream goes on.
+            self._refused("wrench", error)
+        finally:
+            self._aim()
 
     def _publish(self, offsets: list[int]) -> None:
         onset = self._onset

@@ -19,14 +19,19 @@ if TYPE_CHECKING:
 # Most characters of a sentence, which may hold names that came in.
 LONGEST_SENTENCE = 2000
 _FLOATS = ("double", "float")
+# Division by zero and overflow of plain floats, and matrices that rounding has spoilt.
+_ARITHMETIC = (ArithmeticError, np.linalg.LinAlgError)
 
 
 def code_name(error: Exception) -> str:
     """Return the name of the constant of `ErrorCode` that stands for an error.
 
-    What the package did not raise on purpose is a defect of it: INTERNAL.
+    Arithmetic that broke off, as numbers near 1e100 make it, found no answer: NO_CONVERGENCE. What
+    else the package did not raise on purpose is a defect of it: INTERNAL.
     """
-    return error.code if isinstance(error, LimitSurfaceError) else LimitSurfaceError.code
+    if isinstance(error, LimitSurfaceError):
+        return error.code
+    return SolverError.code if isinstance(error, _ARITHMETIC) else LimitSurfaceError.code
 
 
 def error_code(error: Exception) -> int:
@@ -38,6 +43,11 @@ def sentence(error: Exception) -> str:
     """Return what a person should read."""
     if isinstance(error, LimitSurfaceError):
         return shortened(str(error), LONGEST_SENTENCE)
+    if isinstance(error, _ARITHMETIC):
+        return (
+            f"no answer was found ({shortened(str(error))}): the numbers asked for are beyond "
+            "what this model can be computed for"
+        )
     message = f"defect of limit_surface_ros, please report it: {type(error).__name__}: {error}"
     return shortened(message, LONGEST_SENTENCE)
 

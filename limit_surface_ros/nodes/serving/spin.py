@@ -19,6 +19,7 @@ import time
 import traceback
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import rclpy
 import rclpy.logging
 from rclpy.exceptions import ParameterException
@@ -100,6 +101,8 @@ def run(
     _open_standard_streams()
     sys.setswitchinterval(SWITCH_INTERVAL)
     keep_large_pieces()
+    # Numbers near the ends of their range overflow; what leaves a node is looked at instead.
+    np.seterr(all="ignore")
     # Whichever thread the kernel picks (OpenBLAS has some of its own), Python writes to this end.
     woken, wakes = socket.socketpair()
     wakes.setblocking(False)
