@@ -45,7 +45,8 @@ _BLOCK = 1024
 OVERLAPS = ("keep", "push_out")
 # Depth of a tip's centre within an outline, in mean radii, that no error of a pose explains.
 _DEEPEST = 0.25
-_PARTINGS = 30
+# Rounds in which tips and bodies are parted, until no overlap is left but rounding [m].
+_PARTINGS, _ROUNDING = 30, 1e-15
 # Motions that are searched for in a push, at least.
 _SEARCHES = 10
 
@@ -250,15 +251,13 @@ class Pushing:
             return begun, np.minimum(self.radius, near.distances)
         for _ in range(_PARTINGS):
             depth = np.maximum(self.radius - near.distances, 0.0)
-            if not depth.any():
+            if (depth <= _ROUNDING).all():
                 break
             c, s = np.cos(begun[:, 2]), np.sin(begun[:, 2])
             nx, ny = near.normals.T * depth
             begun[:, 0] -= c * nx - s * ny
             begun[:, 1] -= s * nx + c * ny
             near = outline.nearest(_seen_from(begun, tips))
-            # What rounding leaves is no overlap.
-            near.distances[np.abs(near.distances - self.radius) < 1e-15] = self.radius
         return begun, np.minimum(self.radius, near.distances)
 
 

@@ -259,6 +259,8 @@ def test_vertices_and_pushers_that_leave_have_systems_too():
         assert pulled.modes == SEPARATE
         assert not pulled.rates.any()
         assert np.isfinite(pulled.margins).all()
+        # No force has no direction that could turn.
+        assert pulled.margins.any() == any(force)
 
 
 def test_one_state_is_as_many():

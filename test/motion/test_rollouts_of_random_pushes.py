@@ -14,7 +14,16 @@ from limit_surface_ros.motion.outcomes import ContactMode
 from limit_surface_ros.motion.outline import Polygon
 from limit_surface_ros.motion.rollout import simulate_push, simulate_pushes
 from limit_surface_ros.motion.round_outlines import Ellipse, SmoothCurve
-from push_helpers import BUTTERFLY, RECTANGLE, TIP, ellipsoid, metric, random_runs, surfaces
+from push_helpers import (
+    BUTTERFLY,
+    RECTANGLE,
+    TIP,
+    ellipsoid,
+    metric,
+    random_runs,
+    surfaces,
+    turned,
+)
 
 SURFACES = surfaces()
 
@@ -140,21 +149,24 @@ def test_a_path_around_a_corner_pushes_twice():
     assert run.end_pose[1] > 0.02
 
 
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+@pytest.mark.parametrize("inward", [[1.0, 0.0], [0.0, -1.0]])
 @pytest.mark.parametrize("overlap", ["keep", "push_out"])
-def test_an_overlap_at_the_start_is_kept_or_pushed_out(overlap):
-    depth = 0.002
-    start = np.array([-0.045 - TIP + depth, 0.01])
+def test_an_overlap_at_the_start_is_kept_or_pushed_out(overlap, inward, angle):
+    depth, inward = 0.002, np.array(inward)
+    face = 0.005 * inward[::-1] - RECTANGLE.drawn().max(axis=0) * inward
+    start = face - (TIP - depth) * inward
     run = simulate_push(
         SURFACES["ellipsoid"],
         RECTANGLE,
         TIP,
         0.3,
-        [0, 0, 0],
-        [start, start + np.array([0.02, 0.0])],
+        [0, 0, angle],
+        turned([start, start + 0.02 * inward], angle),
         overlap=overlap,
     )
-    expected = 0.0 if overlap == "keep" else depth
-    assert run.poses[0, 0] == pytest.approx(expected, abs=1e-12)
+    (expected,) = turned([(0.0 if overlap == "keep" else depth) * inward], angle)
+    assert run.poses[0, :2] == pytest.approx(expected, abs=1e-12)
     gap = np.hypot(*(run.tips - run.contacts).T) - TIP
     assert gap == pytest.approx(-depth if overlap == "keep" else 0.0, abs=1e-6)
 

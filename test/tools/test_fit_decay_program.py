@@ -28,6 +28,8 @@ def test_an_example_becomes_a_model_whose_error_is_true(tmp_path, capsys):
     times = np.linspace(0.0, 6.0, 60001)
     error = np.abs(model.sum(times) - examples.hockey_stick()(times)).max()
     assert error == pytest.approx(model.max_error, rel=0.01)
+    # What is proven is hardly more than what was found: then it is what the model states.
+    assert error <= model.max_error == model.fit["error_proven"]
     assert model.name == "f1"
     assert model.fit["method"] == "esprit"
     assert output.read_text().startswith("# Made by: fit_decay f1 --terms 9")
