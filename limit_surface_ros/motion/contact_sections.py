@@ -185,28 +185,42 @@ class _PowerSection(_NormSection):
 
 
 class _QuarticSection:
-    """Of a polynomial of fourth order: five numbers, e_k for c^(4 - k) s^k."""
+    """Of a polynomial of fourth order: five numbers, e_k for c^(4 - k) s^k.
+
+    They belong to the axes along the force without a moment and to its left: at a contact far
+    from the reference point forces along others have moments beside which a force counts little,
+    and their numbers would lose it.
+    """
 
     def __init__(self, surface: Polynomial) -> None:
         """Keep the polynomial."""
         self._surface = surface
 
     def of_contacts(self, along: Floats, across: Floats) -> Floats:
-        """Return e_0 to e_4."""
+        """Return the angle of the first axis and e_0 to e_4."""
+        arm = np.hypot(along[2], across[2])
+        safe = np.where(arm > 0.0, arm, 1.0)
+        c, s = np.where(arm > 0.0, across[2] / safe, 1.0), -along[2] / safe
+        first, second = c * along + s * across, c * across - s * along
+        first[2] = 0.0
+        size = np.maximum(1.0, arm)
+        second /= size
         value, gradient = self._surface.value, self._surface.gradient
-        ends = [value(along.T), value(across.T)]
+        ends = [value(first.T), value(second.T)]
         sides = [
-            (gradient(along.T) * across.T).sum(axis=1),
-            (gradient(across.T) * along.T).sum(axis=1),
+            (gradient(first.T) * second.T).sum(axis=1),
+            (gradient(second.T) * first.T).sum(axis=1),
         ]
         # p(1, 1) + p(1, -1) = 2 (e_0 + e_2 + e_4).
-        both = 0.5 * (value((along + across).T) + value((along - across).T))
-        return np.array([ends[0], sides[0], both - ends[0] - ends[1], sides[1], ends[1]])
+        both = 0.5 * (value((first + second).T) + value((first - second).T))
+        found = np.array([ends[0], sides[0], both - ends[0] - ends[1], sides[1], ends[1]])
+        return np.concatenate([[np.arctan2(s, c)], found * size ** np.arange(5.0)[:, np.newaxis]])
 
     def guess(self, contacts: Floats, wanted: Floats) -> Floats:
         """Return the answer for the ellipse through the axes' ends."""
-        n, t = np.sqrt(contacts[0]), np.sqrt(contacts[4])
-        return np.asarray(np.arctan2(np.sin(wanted) * n, np.cos(wanted) * t))
+        axis, n, t = contacts[0], np.sqrt(contacts[1]), np.sqrt(contacts[5])
+        turn = wanted - axis
+        return np.asarray(np.angle(np.exp(1j * axis) * (t * np.cos(turn) + 1j * n * np.sin(turn))))
 
     def in_corners(self, contacts: Floats, angles: Floats) -> Bools:
         """See `PlaneSection`; none is known."""
@@ -214,8 +228,8 @@ class _QuarticSection:
 
     def respond(self, contacts: Floats, angles: Floats) -> tuple[Floats, Floats, Floats]:
         """See `PlaneSection`."""
-        e0, e1, e2, e3, e4 = contacts
-        c, s = np.cos(angles), np.sin(angles)
+        axis, e0, e1, e2, e3, e4 = contacts
+        c, s = np.cos(angles - axis), np.sin(angles - axis)
         cc, cs, ss = c * c, c * s, s * s
         v_n = 4.0 * e0 * cc * c + 3.0 * e1 * cc * s + 2.0 * e2 * c * ss + e3 * ss * s
         v_t = e1 * cc * c + 2.0 * e2 * cc * s + 3.0 * e3 * c * ss + 4.0 * e4 * ss * s

@@ -100,6 +100,17 @@ def test_a_mirror_swaps_left_and_right(kind):
         )
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_contact_far_from_the_reference_point_is_pushed_as_any_other(kind):
+    rng = np.random.default_rng(12)
+    surface = KINDS[kind](rng)
+    for friction in (0.2, 3.0, 1e15):
+        points, normals, velocities = random_contacts(rng, 40)
+        points *= 1000.0
+        found = pushes(surface, points, normals, friction, velocities)
+        assert not wrong(surface, points, normals, friction, velocities, found).any()
+
+
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_faster_pusher_moves_the_body_faster_and_a_turned_frame_changes_nothing(seed):
     rng = np.random.default_rng(seed)
