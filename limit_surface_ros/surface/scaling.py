@@ -20,6 +20,7 @@ from limit_surface_ros.checks import (
     as_rows,
     as_vectors,
 )
+from limit_surface_ros.errors import RangeError
 from limit_surface_ros.runtime import keep_scratch
 
 if TYPE_CHECKING:
@@ -31,6 +32,12 @@ if TYPE_CHECKING:
     from limit_surface_ros.surface.shape import Shape
 
 
+# Scales that are accepted: products of two of them are numbers.
+_LEAST, _MOST = 1e-100, 1e100
+# Scales between which fourth powers of what is divided by two of them are numbers, too.
+_NEAR_ONE = 1e-20, 1e20
+
+
 @dataclass(frozen=True)
 class Scaling:
     """Units in which a model is dimensionless.
@@ -40,7 +47,7 @@ class Scaling:
         friction_force: F0 [N].
 
     Raises:
-        RangeError: A scale is not a finite number above zero.
+        RangeError: A scale is not a number from 1e-100 to 1e100.
     """
 
     characteristic_length: float = 1.0
@@ -50,8 +57,18 @@ class Scaling:
         """Check the two scales."""
         rho = as_positive("characteristic_length", self.characteristic_length)
         force = as_positive("friction_force", self.friction_force)
+        for name, scale in (("characteristic_length", rho), ("friction_force", force)):
+            if not _LEAST <= scale <= _MOST:
+                raise RangeError(f"{name} must lie between 1e-100 and 1e100, got {scale:g}")
         object.__setattr__(self, "characteristic_length", rho)
         object.__setattr__(self, "friction_force", force)
+
+    @cached_property
+    def is_far_from_one(self) -> bool:
+        """Whether what is divided by a unit may need its size taken out once more."""
+        scales = self.characteristic_length, self.friction_force
+        low, high = _NEAR_ONE
+        return not all(low <= scale <= high for scale in scales)
 
     @cached_property
     def wrench_unit(self) -> Floats:
@@ -126,6 +143,11 @@ class InScaledVariables(ABC):
                 sizes[sizes == 0.0] = 1.0
             columns /= sizes
             columns /= unit[:, np.newaxis]
+            if self.scaling.is_far_from_one:
+                again = np.maximum.reduce(np.abs(columns))
+                again[again == 0.0] = 1.0
+                columns /= again
+                sizes *= again
             yield block, columns, sizes
 
 

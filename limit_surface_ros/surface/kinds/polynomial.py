@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from limit_surface_ros.checks import as_floats, as_vectors
-from limit_surface_ros.errors import MatrixError, ShapeError
+from limit_surface_ros.errors import MatrixError, RangeError, ShapeError
 from limit_surface_ros.surface.base import FileArray, LimitSurface
 from limit_surface_ros.surface.gauges.quartic import MONOMIALS, Quartic
 from limit_surface_ros.surface.gauges.scalar import QuarticScalar
@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 __all__ = ["MONOMIALS", "Polynomial"]
 
 _CHECKED_DIRECTIONS = 2000
+# Sizes of coefficients of which products are numbers.
+_LEAST, _MOST = 1e-100, 1e100
 # Least P(f) / |f|^4 that a polynomial must have where its surface is about the unit sphere.
 _MARGIN = 1e-9
 _STARTS = 500
@@ -58,6 +60,7 @@ class Polynomial(LimitSurface):
     Raises:
         ShapeError: There are not 15 coefficients.
         NotFiniteError: A coefficient is NaN or infinite.
+        RangeError: The largest coefficient is below 1e-100 or above 1e100.
         MatrixError: The polynomial is not positive, so that the surface is not closed.
     """
 
@@ -72,6 +75,11 @@ class Polynomial(LimitSurface):
         coefficients = as_floats("coefficients", self.coefficients).copy()
         if coefficients.shape != (15,):
             raise ShapeError(f"coefficients must have shape (15,), got {coefficients.shape}")
+        size = np.abs(coefficients).max()
+        if size > 0.0 and not _LEAST <= size <= _MOST:
+            raise RangeError(
+                f"the largest coefficient must lie between 1e-100 and 1e100, got {size:g}"
+            )
         coefficients.setflags(write=False)
         object.__setattr__(self, "coefficients", coefficients)
         _check_positive(self._quartic)
