@@ -130,7 +130,7 @@ def _draw_way(
     if ends is not None:
         axes.plot(*(1e3 * ends.poses[:, :2].T), ".", color=PURPLE, markersize=2)
         border = 1e3 * ends.ellipse(_PROBABILITY).border()
-        label = f"{100.0 * _PROBABILITY:.0f} % of the ends"
+        label = f"{100.0 * _PROBABILITY:.0f} % of the members"
         axes.add_patch(Polygon(border, color=PURPLE, alpha=0.3, linewidth=0, label=label))
     axes.set_aspect("equal")
     axes.set_xlabel("x [mm]")

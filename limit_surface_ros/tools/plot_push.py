@@ -104,7 +104,8 @@ def parser() -> argparse.ArgumentParser:
         default=0,
         metavar="N",
         help="push N surfaces, too, that the scatter of a model of `fit_surface --auto` allows, "
-        "and draw the ellipse of 9 of 10 ends",
+        "and draw the ellipse of 9 of 10 of their ends: what the ground does alone; of real ends "
+        "it holds one or two of 10, for the tip's friction, the outline and poses err as well",
     )
     add_motion_options(top, "the body")
     return top
@@ -159,9 +160,10 @@ def report(name: str, found: PushRun, ends: EndPoses | None) -> None:
         large, small = 1e3 * ends.ellipse(0.9).half_axes
         least, _, most = np.degrees(ends.pose_quantiles[:, 2])
         print(
-            f"spread      9 of 10 ends in an ellipse of half-axes {large:.2f} and {small:.2f} mm, "
-            f"angles from {least:.2f} to {most:.2f} deg"
+            "spread      9 of 10 members in an ellipse of half-axes "
+            f"{large:.2f} and {small:.2f} mm, angles from {least:.2f} to {most:.2f} deg"
         )
+        print("            by the ground alone: real ends lie outside far more often")
 
 
 def run(options: argparse.Namespace) -> None:

@@ -4,10 +4,10 @@
 import numpy as np
 import pytest
 
-from limit_surface_ros.errors import RangeError
+from limit_surface_ros.errors import DataError, NotFiniteError, RangeError, ShapeError
 from limit_surface_ros.motion.outline import Polygon
 from limit_surface_ros.motion.rollout import simulate_push
-from limit_surface_ros.motion.spread import EndPoses, push_spread
+from limit_surface_ros.motion.spread import EndPoses, calibrate_ends, push_spread
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.kinds.dissipation_scatter import (
     FRICTION,
@@ -77,3 +77,54 @@ def test_no_spread_is_told_of_one_member_or_no_share():
         EndPoses(np.zeros((3, 3))).ellipse(1.0)
     # Members that agree end at one place.
     assert not EndPoses(np.ones((3, 3))).ellipse(0.9).half_axes.any()
+
+
+def thin_ensembles(count, rng):
+    """Ensembles that differ along one direction each, and ends that err by more, in all."""
+    ends, recorded = [], np.zeros((count, 3))
+    for number in range(count):
+        along = np.array([*rng.normal(size=2), 0.0])
+        offsets = 1e-3 * rng.normal(size=(12, 1)) * along + 1e-5 * rng.normal(size=(12, 3))
+        centre = np.array([*rng.normal(size=2), 0.0])
+        ends.append(EndPoses(centre + offsets))
+        scatter = 2e-3 * rng.standard_t(4, size=2)
+        recorded[number, :2] = centre[:2] + scatter + 1e-3 * rng.normal() * along[:2]
+    return ends, recorded
+
+
+def holds(ellipse, place):
+    c, s = np.cos(ellipse.angle), np.sin(ellipse.angle)
+    along = np.array([[c, s], [-s, c]]) @ (place - ellipse.centre)
+    return float(np.sum((along / ellipse.half_axes) ** 2)) <= 1.0
+
+
+def test_recorded_ends_make_the_ellipse_hold_what_it_says():
+    rng = np.random.default_rng(0)
+    ends, recorded = thin_ensembles(900, rng)
+    calibrated, bare = [], []
+    for begin in range(0, 900, 30):
+        known = calibrate_ends(ends[begin : begin + 19], recorded[begin : begin + 19])
+        for number in range(begin + 19, begin + 30):
+            place = recorded[number, :2]
+            calibrated.append(holds(known.ellipse(ends[number], 0.9), place))
+            bare.append(holds(ends[number].ellipse(0.9), place))
+    assert np.mean(bare) < 0.3
+    assert np.mean(calibrated) == pytest.approx(0.9, abs=0.05)
+
+
+def test_nine_recorded_ends_are_the_fewest_for_nine_of_ten():
+    ends, recorded = thin_ensembles(9, np.random.default_rng(1))
+    known = calibrate_ends(ends, recorded)
+    places = recorded[:, :2]
+    inside = [holds(known.ellipse(each, 0.9), p) for each, p in zip(ends, places, strict=True)]
+    assert sum(inside) >= 8
+    with pytest.raises(DataError, match="at least 19 recorded pushes, there are 9"):
+        known.ellipse(ends[0], 0.95)
+    with pytest.raises(RangeError, match="probability"):
+        known.ellipse(ends[0], 1.0)
+    with pytest.raises(ShapeError, match="9 ensembles need as many poses, there are 8"):
+        calibrate_ends(ends, recorded[:8])
+    with pytest.raises(NotFiniteError):
+        calibrate_ends(ends, np.full((9, 3), np.nan))
+    with pytest.raises(DataError, match="no recorded pushes"):
+        calibrate_ends([], np.empty((0, 3)))

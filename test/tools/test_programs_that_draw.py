@@ -217,8 +217,10 @@ def test_plot_push_draws_where_members_of_a_scatter_end(tmp_path, pushed_file, c
     path, picture = tmp_path / "box.yaml", tmp_path / "push.svg"
     write_surface_model(model, path)
     assert plot_push.main([str(path), "--members", "8", "-o", str(picture)]) == 0
-    assert "spread      9 of 10 ends in an ellipse of half-axes" in capsys.readouterr().out
-    assert "90 % of the ends" in picture.read_text()
+    told = capsys.readouterr().out
+    assert "spread      9 of 10 members in an ellipse of half-axes" in told
+    assert "by the ground alone: real ends lie outside far more often" in told
+    assert "90 % of the members" in picture.read_text()
 
 
 def test_plot_push_without_a_path_pushes_from_the_left(tmp_path, pushed_file, capsys):
