@@ -65,6 +65,8 @@ def holds_strays(values: Floats, noise: float) -> bool:
     """Tell whether samples stand out that neither a kink nor a jump of a response would explain.
 
     A stray sample is further from the two on either side than these are from each other, by far.
+    One of the last two, which have no such neighbours, is further so from the four before them,
+    and larger: a load that is gone with the last sample is none, no decaying one comes back.
 
     Args:
         values: Shape (n,).
@@ -74,7 +76,12 @@ def holds_strays(values: Floats, noise: float) -> bool:
     inner = np.flatnonzero(marked[2:-2]) + 2
     around = values[inner[:, np.newaxis] + np.array([-2, -1, 1, 2])]
     away = np.abs(values[inner, np.newaxis] - around).min(axis=1)
-    return bool((away > STRAY * (np.ptp(around, axis=1) + noise)).any())
+    if (away > STRAY * (np.ptp(around, axis=1) + noise)).any():
+        return True
+    before, last = values[-6:-2], values[-2:][marked[-2:]]
+    away = np.abs(last[:, np.newaxis] - before).min(axis=1)
+    grown = np.abs(last) > np.abs(before).max()
+    return bool((grown & (away > STRAY * (np.ptp(before) + noise))).any())
 
 
 def neighbour_weights(residuals: Floats, noise: float) -> Floats:

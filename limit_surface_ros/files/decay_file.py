@@ -110,9 +110,10 @@ class DecayModel:
     def bounds(self, times: ArrayLike) -> Floats:
         """Return what |x - response| does not exceed at given times, as the file states it.
 
-        On the time span the error that was measured there; after it, what the sum and the
-        response may differ by if the response does as the tail assumes. Infinite where the file
-        states nothing: before the span, and after it without a tail.
+        On the time span the error that was measured there, of a record at its samples and not
+        between them; after it, what the sum and the response may differ by if the response does
+        as the tail assumes. Infinite where the file states nothing: before the span, and after it
+        without a tail.
 
         Args:
             times: Any shape [s].

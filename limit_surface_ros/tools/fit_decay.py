@@ -55,9 +55,11 @@ it, or over its last swing. Every fit is held to that there, or to its error if 
 what it provably never exceeds is printed and written beside the assumption.
 
 Records: a fit is made on the samples and its error measured there; only how far the sum departs
-from lines between samples beyond the record's own curvature is counted too. Methods that need a
-function (the kernel of dde, the samples of esprit from a record that is not uniform) take straight
-lines.
+from lines between samples beyond the record's own curvature is counted too. What a response does
+between two samples no record tells: a kink there may be missed by more than `max_error`. How far
+the sum is from straight lines is printed as `between` and written as `error_between`. Methods that
+need a function (the kernel of dde, the samples of esprit from a record that is not uniform) take
+straight lines.
 
 examples:
   fit_decay f1 --terms 9 --output hockey_stick.yaml

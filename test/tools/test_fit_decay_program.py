@@ -400,6 +400,7 @@ def test_outliers_noise_and_terms_are_told_and_written(tmp_path, capsys):
     model = read_decay_model(output)
     assert model.norm == "2"
     assert model.noise == pytest.approx(0.02, rel=0.15)
+    assert model.max_error <= model.fit["error_between"] < 2.0 * model.max_error
     assert model.fit["outlier_times"] == [0.6, 2.0, 3.33]
     assert model.tail.bound < 0.001 < model.tail.envelope
 

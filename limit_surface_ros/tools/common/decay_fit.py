@@ -11,6 +11,7 @@ import numpy as np
 from limit_surface_ros import __version__
 from limit_surface_ros.decay.fit import Options
 from limit_surface_ros.decay.grids import largest_error
+from limit_surface_ros.decay.targets import PiecewiseLinear, Record
 from limit_surface_ros.files.decay_file import DecayModel
 
 if TYPE_CHECKING:
@@ -68,6 +69,16 @@ def method_options(options: argparse.Namespace) -> Options:
     )
 
 
+def between(result: DecayFit, given: DecayInput) -> float | None:
+    """Return how far the sum is from lines between samples but outliers; None for an example."""
+    if not isinstance(given.target, Record):
+        return None
+    times = given.target.knots
+    kept = ~np.isin(times, result.outliers)
+    lines = PiecewiseLinear(times[kept], given.target.values[kept])
+    return largest_error(result.fit.sum, lines, 0.0, given.end)
+
+
 def beyond(result: DecayFit, given: DecayInput) -> float | None:
     """Return the largest error beyond the fitted interval; None where nothing is known there."""
     if given.horizon <= given.end:
@@ -104,6 +115,9 @@ def provenance(result: DecayFit, given: DecayInput) -> dict[str, Any]:
         values["error_proven"] = result.largest.proven
     elif result.largest is not None:
         values["error_found_on"] = result.largest.points
+    lines = between(result, given)
+    if lines is not None:
+        values["error_between"] = lines
     if len(result.outliers):
         values["outlier_times"] = result.outliers[:_MOST_WRITTEN].tolist()
     if result.terms_tried:

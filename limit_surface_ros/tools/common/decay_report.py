@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.checks import counted
-from limit_surface_ros.decay.grids import largest_error
 from limit_surface_ros.decay.noise import resting_level
-from limit_surface_ros.decay.targets import PiecewiseLinear, Record
-from limit_surface_ros.tools.common.decay_fit import beyond
+from limit_surface_ros.decay.targets import Record
+from limit_surface_ros.tools.common.decay_fit import between, beyond
 
 if TYPE_CHECKING:
     from limit_surface_ros.decay.certify import LargestError
@@ -99,16 +98,6 @@ def tried_in_words(result: DecayFit) -> str:
     return "BIC above the least: " + ", ".join(
         f"{tried.terms} terms {tried.bic - least:.1f}" for tried in result.terms_tried
     )
-
-
-def between(result: DecayFit, given: DecayInput) -> float | None:
-    """Return how far the sum is from lines between samples but outliers; None for an example."""
-    if not isinstance(given.target, Record):
-        return None
-    times = given.target.knots
-    kept = ~np.isin(times, result.outliers)
-    lines = PiecewiseLinear(times[kept], given.target.values[kept])
-    return largest_error(result.fit.sum, lines, 0.0, given.end)
 
 
 def doubts(result: DecayFit, given: DecayInput) -> list[str]:
