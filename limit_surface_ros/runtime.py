@@ -15,11 +15,13 @@ import importlib
 import os
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+_LAST_STANDARD = 2
 # Exit code of a program that was interrupted: that of a shell for SIGINT.
 INTERRUPTED = 130
 # Of malloc.h.
@@ -42,11 +44,30 @@ def run(package: str, name: str) -> int:
     Returns:
         The exit code: what `main` returns, or 130 after an interrupt that it did not see to.
     """
+    mend_standard_streams()
     try:
         return int(importlib.import_module(f"{package}.{name}").main())
     except KeyboardInterrupt:
         sys.stderr.write(f"{name}: interrupted\n")
         return INTERRUPTED
+
+
+def mend_standard_streams() -> None:
+    """Give a program the standard streams that were closed, and texts that can always be printed.
+
+    Without the former its own files would get their numbers; names of files may hold what the
+    terminal's encoding does not.
+    """
+    while (number := os.open(os.devnull, os.O_RDWR)) <= _LAST_STANDARD:
+        pass
+    os.close(number)
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            # As long as the process lives.
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
+        elif stream.errors == "strict" and hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
 
 
 @dataclass(frozen=True)

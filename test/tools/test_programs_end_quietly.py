@@ -14,6 +14,7 @@ from limit_surface_ros import runtime
 from process_helpers import REPOSITORY
 
 PROGRAM = [sys.executable, "-m", "limit_surface_ros.tools.fit_decay"]
+MODEL = REPOSITORY / "config" / "models" / "triangle_patch.yaml"
 FIT = [*PROGRAM, "f1", "--terms", "1", "--method", "esprit"]
 
 
@@ -36,6 +37,38 @@ def test_a_full_disk_is_told_in_one_line():
     assert ended.returncode == 1
     assert ended.stderr.splitlines()[-1].startswith("fit_decay: error: ")
     assert "Traceback" not in ended.stderr
+
+
+EXPORT = [sys.executable, "-m", "limit_surface_ros.tools.export_surface"]
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+def test_closed_standard_streams_are_no_error_and_no_file_takes_their_place(tmp_path, closed):
+    output = tmp_path / "model.hpp"
+    program = [*EXPORT, MODEL, "--to", "cpp", "-o", output]
+    ended = subprocess.run(
+        ["sh", "-c", f'exec "$@" {closed}', "sh", *map(str, program)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert output.read_text().endswith("\n")
+    assert "written     " not in output.read_text()
+
+
+def test_a_name_that_the_encoding_does_not_have_is_printed_all_the_same(tmp_path):
+    output = tmp_path / "ö \udcff.hpp"
+    ended = subprocess.run(
+        [*EXPORT, MODEL, "--to", "cpp", "-o", output],
+        env=os.environ | {"PYTHONIOENCODING": "ascii"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert "\\xf6 \\udcff.hpp" in ended.stdout
+    assert output.exists()
 
 
 @pytest.mark.parametrize("package", ["tools", "nodes"])

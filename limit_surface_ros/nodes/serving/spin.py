@@ -31,7 +31,7 @@ from rclpy.utilities import remove_ros_args
 from limit_surface_ros.errors import FileError, LimitSurfaceError, RangeError
 from limit_surface_ros.nodes.serving import middleware
 from limit_surface_ros.nodes.serving.settings import Setting, help_of
-from limit_surface_ros.runtime import keep_large_pieces
+from limit_surface_ros.runtime import keep_large_pieces, mend_standard_streams
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -68,7 +68,6 @@ SWITCH_INTERVAL = 5e-4
 # is lost if the node is gone before [s].
 TIME_TO_SEND, TIME_TO_SEND_MUCH = 0.3, 3.0
 _LONG = 3600.0
-_LAST_STANDARD = 2
 EXECUTOR = Setting(
     "executor",
     "single_threaded",
@@ -98,7 +97,7 @@ def run(
         The process's exit code: 0 after SIGINT, SIGTERM or SIGHUP, 1 if the nodes could not
         start, be it because they ask for different executors.
     """
-    _open_standard_streams()
+    mend_standard_streams()
     sys.setswitchinterval(SWITCH_INTERVAL)
     keep_large_pieces()
     # Numbers near the ends of their range overflow; what leaves a node is looked at instead.
@@ -176,13 +175,6 @@ def _executor(nodes: Sequence[Any]) -> Executor:
         else:
             return EventsExecutor()
     return SingleThreadedExecutor()
-
-
-def _open_standard_streams() -> None:
-    """Open those that were closed: else other files get their numbers, and the log with them."""
-    while (number := os.open(os.devnull, os.O_RDWR)) <= _LAST_STANDARD:
-        pass
-    os.close(number)
 
 
 def _answer_what_waits(

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from limit_surface_ros.errors import LimitSurfaceError
-from limit_surface_ros.runtime import INTERRUPTED
+from limit_surface_ros.runtime import INTERRUPTED, mend_standard_streams
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -86,6 +86,7 @@ def run_program(
         after one of the system, such as a full disk, 1 with a line; 1 without a line if whoever
         read the output has closed it; 130 after an interrupt.
     """
+    mend_standard_streams()
     arguments = parser.parse_args(argv)
     try:
         with _plain_warnings(parser.prog):
