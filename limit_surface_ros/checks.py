@@ -7,6 +7,8 @@ Comparisons are written so that NaN fails them.
 
 from __future__ import annotations
 
+import operator
+import sys
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -32,7 +34,8 @@ if TYPE_CHECKING:
 LARGEST = 1.0e100
 SMALLEST = 1.0e-100
 _REAL = (float, int)
-_INFINITY = float("inf")
+# Whole numbers of Python have no infinity, and are compared with this exactly.
+_LARGEST_FLOAT = sys.float_info.max
 
 
 def counted(count: int, noun: str) -> str:
@@ -57,6 +60,47 @@ def as_floats(name: str, values: ArrayLike) -> Floats:
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         where = f" at index {place}" if place else ""
         raise NotFiniteError(f"{name} must be finite, got {array[place]}{where}")
+    return array
+
+
+def as_number(name: str, value: ArrayLike) -> float:
+    """Return `value` as a finite float.
+
+    Raises:
+        ShapeError: The value is no number, or more than one.
+        NotFiniteError: The value is NaN or infinite.
+    """
+    array = as_floats(name, value)
+    if array.ndim:
+        raise ShapeError(f"{name} must be one number, got shape {array.shape}")
+    return float(array)
+
+
+def as_count(name: str, value: int, least: int = 1) -> int:
+    """Return `value` as a whole number that is at least `least`.
+
+    Raises:
+        RangeError: The value is no whole number, or less.
+    """
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise RangeError(f"{name} must be a whole number, got {shortened(repr(value))}") from None
+    if number < least:
+        raise RangeError(f"{name} must be at least {least}, got {number}")
+    return number
+
+
+def as_vector(name: str, values: ArrayLike) -> Floats:
+    """Return `values` as a finite float64 array of shape (3,).
+
+    Raises:
+        ShapeError: They are no three numbers.
+        NotFiniteError: A component is NaN or infinite.
+    """
+    array = as_vectors(name, values)
+    if array.ndim != 1:
+        raise ShapeError(f"{name} must have shape (3,), got {array.shape}")
     return array
 
 
@@ -104,9 +148,12 @@ def as_rows(name: str, values: ArrayLike) -> Floats:
 
 
 def _as_numbers(name: str, values: ArrayLike) -> Floats:
+    # Of these numpy would make numbers: real parts, or years since 1970.
+    if isinstance(values, np.ndarray) and values.dtype.kind in "cmM":
+        raise ShapeError(f"{name} must be an array of real numbers, got {values.dtype}")
     try:
         return np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise ShapeError(f"{name} must be an array of numbers: {error}") from None
 
 
@@ -125,7 +172,7 @@ def one_direction(values: Any) -> tuple[float, float, float] | None:
     x, y, z = values
     if not (type(x) in _REAL and type(y) in _REAL and type(z) in _REAL):
         return None
-    return (x, y, z) if 0.0 < abs(x) + abs(y) + abs(z) < _INFINITY else None
+    return (x, y, z) if 0.0 < abs(x) + abs(y) + abs(z) <= _LARGEST_FLOAT else None
 
 
 def as_directions(name: str, values: ArrayLike) -> Floats:
@@ -153,8 +200,9 @@ def as_positive(name: str, value: float) -> float:
     """
     try:
         number = float(value)
-    except (TypeError, ValueError):
-        raise RangeError(f"{name} must be a number above 0, got {value!r}") from None
+    except (TypeError, ValueError, OverflowError):
+        given = shortened(repr(value))
+        raise RangeError(f"{name} must be a number above 0, got {given}") from None
     if not 0.0 < number < float("inf"):
         raise RangeError(f"{name} must be a finite number above 0, got {number}")
     return number

@@ -30,7 +30,7 @@ def as_complexes(name: str, values: ArrayLike) -> Complexes:
     """
     try:
         array = np.array(values, dtype=np.complex128)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise ShapeError(f"{name} must be a list of numbers: {error}") from None
     if array.ndim != 1 or array.size == 0:
         raise ShapeError(f"{name} must have shape (m,) with m >= 1, got {array.shape}")

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.checks import as_floats, as_positive
+from limit_surface_ros.checks import as_number, as_positive
 from limit_surface_ros.decay.families import FAMILIES, Learnt
 from limit_surface_ros.errors import RangeError
 
@@ -310,8 +310,8 @@ class ResponseEstimator:
             NotFiniteError: A number is NaN or infinite.
             RangeError: The time is before the onset or not after that of the sample before.
         """
-        t = float(as_floats("time of a sample", time))
-        y = float(as_floats("value of a sample", value))
+        t = as_number("time of a sample", time)
+        y = as_number("value of a sample", value)
         if t < 0.0:
             raise RangeError(f"a sample's time must be at least 0, got {t:g} s before the onset")
         if not t > self._last_time:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
-from limit_surface_ros.checks import as_floats
+from limit_surface_ros.checks import as_count, as_floats, as_number
 from limit_surface_ros.decay.basis import (
     as_complexes,
     as_rates,
@@ -31,7 +31,7 @@ from limit_surface_ros.runtime import keep_scratch
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from limit_surface_ros.checks import Floats
+    from limit_surface_ros.checks import Floats, as_count
     from limit_surface_ros.decay.basis import Complexes
 
 # Exponentials that are evaluated at a time.
@@ -147,11 +147,10 @@ class ExponentialSum:
         """Return the derivative of x of the given order, again a sum of exponentials.
 
         Raises:
-            RangeError: The order is negative.
+            RangeError: The order is negative or no whole number.
         """
-        if order < 0:
-            raise RangeError(f"order must be at least 0, got {order}")
-        return ExponentialSum(self.rates, self.coefficients * self.rates**order)
+        times = as_count("order", order, 0)
+        return ExponentialSum(self.rates, self.coefficients * self.rates**times)
 
     def integral(self, times: ArrayLike) -> Floats:
         """Return the integral of x from 0 to each time, in the unit of x times [s].
@@ -199,7 +198,7 @@ class ExponentialSum:
             UnstableError: A rate other than 0 does not decay, so that no time can be named.
             SolverError: The sum oscillates too fast for its decay to be searched.
         """
-        height = float(as_floats("level", level))
+        height = as_number("level", level)
         if height < 0.0:
             raise RangeError(f"level must be at least 0, got {height}")
         self._require_settling()
@@ -227,7 +226,7 @@ class ExponentialSum:
             >>> round(ExponentialSum([-1.0, -2.0], [1.0, -1.0]).supremum(), 3)
             0.25
         """
-        since = float(as_floats("start", start))
+        since = as_number("start", start)
         if since < 0.0:
             raise RangeError(f"start must be at least 0, got {since}")
         self._require_settling()
@@ -247,13 +246,12 @@ class ExponentialSum:
             terms: Number of real terms to keep, at least 1; pairs are kept or dropped whole.
 
         Raises:
-            RangeError: The number is below 1, or too small for any rate of this sum.
+            RangeError: The number is no whole one, below 1, or too small for any rate of this sum.
         """
-        if terms < 1:
-            raise RangeError(f"terms must be at least 1, got {terms}")
+        most = as_count("terms", terms)
         sizes = np.where(self.rates.imag == 0.0, 1, 2)
         kept: list[int] = []
-        remaining = terms
+        remaining = most
         for index in np.argsort(-np.abs(self.coefficients), kind="stable"):
             if sizes[index] <= remaining:
                 kept.append(int(index))

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.checks import as_floats
+from limit_surface_ros.checks import as_number
 from limit_surface_ros.errors import MissingExtraError, RangeError, SolverError
 from limit_surface_ros.fitting.pairs import check_support, scale_pairs
 from limit_surface_ros.fitting.result import FitResult, errors_on
@@ -56,7 +56,7 @@ def fit_polynomial(
         SolverError: The semidefinite program has no solution.
         MissingExtraError: `convex` is asked for and cvxpy is not installed.
     """
-    weight = float(as_floats("velocity_weight", velocity_weight))
+    weight = as_number("velocity_weight", velocity_weight)
     if weight < 0.0:
         raise RangeError(f"velocity_weight must not be negative, got {weight}")
     begin = time.perf_counter()

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limit_surface_ros.checks import as_floats
+from limit_surface_ros.checks import as_floats, as_number
 from limit_surface_ros.errors import RangeError, ShapeError
 from limit_surface_ros.fitting.factors import (
     PARAMETERS_PER_MATRIX,
@@ -91,7 +91,7 @@ def fit_power_sum(
         raise ShapeError(f"exponents must have shape (m,) with m >= 1, got {powers.shape}")
     if not ((powers > 0.0) & (powers <= 1.0)).all():
         raise RangeError(f"exponents must lie in (0, 1], got {powers.tolist()}")
-    weight = float(as_floats("velocity_weight", velocity_weight))
+    weight = as_number("velocity_weight", velocity_weight)
     if weight < 0.0:
         raise RangeError(f"velocity_weight must not be negative, got {weight}")
     scaled = scale_pairs(pairs, scaling)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.checks import as_floats
+from limit_surface_ros.checks import as_number
 from limit_surface_ros.errors import RangeError, SolverError
 from limit_surface_ros.fitting.factors import (
     PARAMETERS_PER_MATRIX,
@@ -146,7 +146,7 @@ def fit_second_approximation(
         DataError: The pairs cannot determine such a surface.
         SolverError: The surface does not pass through the loads.
     """
-    weight = float(as_floats("velocity_weight", velocity_weight))
+    weight = as_number("velocity_weight", velocity_weight)
     if weight < 0.0:
         raise RangeError(f"velocity_weight must not be negative, got {weight}")
     begin = time.perf_counter()

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.checks import as_floats
+from limit_surface_ros.checks import as_number
 from limit_surface_ros.decay.response import onset_value
 from limit_surface_ros.errors import RangeError
 
@@ -69,8 +69,8 @@ def holds_from(x: ExponentialSum, load_factor: float, max_error: float = 0.0) ->
         >>> round(holds_from(ExponentialSum([-1.0], [1.0]), 3.0).time, 6)
         1.098612
     """
-    factor = float(as_floats("load factor", load_factor))
-    error = float(as_floats("max_error", max_error))
+    factor = as_number("load factor", load_factor)
+    error = as_number("max_error", max_error)
     if factor < 0.0 or error < 0.0:
         raise RangeError(
             f"load factor and max_error must be at least 0, got {factor:g} and {error:g}"

@@ -28,9 +28,12 @@ def friction_edges(friction: ArrayLike, count: int) -> Complexes:
         RangeError: A coefficient is negative or NaN.
     """
     try:
-        given = np.asarray(friction, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ShapeError("friction must be a number, or one for each push") from None
+        # The real part of a complex number is no friction.
+        given = np.asarray(friction, dtype=np.float64) if np.isrealobj(friction) else None
+    except (TypeError, ValueError, OverflowError):
+        given = None
+    if given is None:
+        raise ShapeError("friction must be a number, or one for each push")
     if given.shape not in ((), (count,)):
         raise ShapeError(f"friction must be one number or {count}, got shape {given.shape}")
     if not (given >= 0.0).all():
@@ -40,6 +43,22 @@ def friction_edges(friction: ArrayLike, count: int) -> Complexes:
     along = 1.0 / np.hypot(1.0, given)
     across = np.where(limited, np.where(limited, given, 0.0) * along, 1.0)
     return np.asarray(np.broadcast_to(along + 1j * across, (count,)))
+
+
+def one_friction(friction: float) -> float:
+    """Return a coefficient of friction, from 0 to infinity, as a float.
+
+    Raises:
+        ShapeError: It is no number.
+        RangeError: It is negative or NaN.
+    """
+    try:
+        given = float(friction)
+    except (TypeError, ValueError, OverflowError):
+        raise ShapeError("friction must be a number") from None
+    if not given >= 0.0:
+        raise RangeError(f"friction must be 0 or above, up to infinity, got {given}")
+    return given
 
 
 def unit_normals(normals: Floats) -> Floats:

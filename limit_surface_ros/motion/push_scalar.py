@@ -10,8 +10,9 @@ import numpy as np
 
 from limit_surface_ros.bracket import root_bracket
 from limit_surface_ros.checks import as_floats
-from limit_surface_ros.errors import RangeError, ShapeError, ZeroVectorError
+from limit_surface_ros.errors import ShapeError, ZeroVectorError
 from limit_surface_ros.motion.outcomes import ContactMode, Push
+from limit_surface_ros.motion.push_checks import one_friction
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -58,8 +59,7 @@ class ContactScalar:
         nx, ny = pair("normal", normal)
         if not (nx or ny):
             raise ZeroVectorError("normal must not be zero: it has no direction")
-        if not friction >= 0.0:
-            raise RangeError(f"friction must be 0 or above, up to infinity, got {friction}")
+        friction = one_friction(friction)
         size = max(abs(nx), abs(ny))
         nx, ny = nx / size, ny / size
         length = hypot(nx, ny)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.checks import as_coordinates, as_positive
+from limit_surface_ros.checks import as_coordinates, as_number, as_positive
 from limit_surface_ros.errors import OutlineError, RangeError, ShapeError
 from limit_surface_ros.motion.inward_corner import Scene
 from limit_surface_ros.motion.outcomes import MODES, PushRun, PushRuns
@@ -156,7 +156,7 @@ class Pushing:
         reference_point: ArrayLike = (0.0, 0.0),
     ) -> None:
         """Check the settings."""
-        radius = float(as_coordinates("tip_radius", tip_radius))
+        radius = as_number("tip_radius", as_coordinates("tip_radius", tip_radius))
         if radius < 0.0:
             raise RangeError(f"tip_radius must be 0 or above, got {radius}")
         if not _FINEST <= as_positive("accuracy", accuracy) <= _COARSEST:

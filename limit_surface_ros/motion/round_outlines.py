@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.checks import as_floats, as_positive
+from limit_surface_ros.checks import as_floats, as_number, as_positive
 from limit_surface_ros.errors import ShapeError
 from limit_surface_ros.motion.outline import (
     MOST_VERTICES,
@@ -53,7 +53,9 @@ class Ellipse(Outline):
         for axis in axes.tolist():
             check_length("semi_axes", as_positive("semi_axes", axis))
         self.semi_axes, self.centre = axes.copy(), middle.copy()
-        self.angle = float(as_floats("angle", angle))
+        for array in (self.semi_axes, self.centre):
+            array.setflags(write=False)
+        self.angle = as_number("angle", angle)
         c, s = np.cos(self.angle), np.sin(self.angle)
         self._turn = np.array([[c, -s], [s, c]])
 

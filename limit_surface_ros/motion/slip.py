@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.checks import as_floats, as_positive, as_vectors
+from limit_surface_ros.checks import as_floats, as_number, as_positive, as_vectors
 from limit_surface_ros.decay.response import onset_value
 from limit_surface_ros.errors import DataError, RangeError, ShapeError, SolverError, UnstableError
 from limit_surface_ros.motion.crossings import first_above
@@ -221,7 +221,7 @@ def predict_slip(
         >>> predict_slip(disc, pad, (0.6, 0.0, 0.0)).slips
         False
     """
-    error = float(as_floats("max_error", max_error))
+    error = as_number("max_error", max_error)
     if error < 0.0:
         raise RangeError(f"max_error must be at least 0, got {error:g}")
     start = onset_value(x)
@@ -282,7 +282,7 @@ def load_factors(
 
 
 def _as_exponent(exponent: float) -> float:
-    value = float(as_floats("exponent", exponent))
+    value = as_number("exponent", exponent)
     if not 0.0 <= value <= LARGEST_EXPONENT:
         raise RangeError(f"exponent must lie in [0, {LARGEST_EXPONENT:g}], got {value:g}")
     return value

@@ -74,22 +74,29 @@ class Scaling:
     def wrench_unit(self) -> Floats:
         """(F0, F0, F0 rho) in [N, N, N m], shape (3,)."""
         force = self.friction_force
-        return np.array([force, force, force * self.characteristic_length])
+        return _kept([force, force, force * self.characteristic_length])
 
     @cached_property
     def twist_unit(self) -> Floats:
         """(1, 1, 1 / rho) in [m/s, m/s, rad/s], shape (3,)."""
-        return np.array([1.0, 1.0, 1.0 / self.characteristic_length])
+        return _kept([1.0, 1.0, 1.0 / self.characteristic_length])
 
     @cached_property
     def twist_by_wrench_unit(self) -> Floats:
         """Of derivatives of twists by wrenches, shape (3, 3)."""
-        return np.multiply.outer(self.twist_unit, 1.0 / self.wrench_unit)
+        return _kept(np.multiply.outer(self.twist_unit, 1.0 / self.wrench_unit))
 
     @cached_property
     def wrench_by_twist_unit(self) -> Floats:
         """Of derivatives of wrenches by twists, shape (3, 3)."""
-        return np.multiply.outer(self.wrench_unit, 1.0 / self.twist_unit)
+        return _kept(np.multiply.outer(self.wrench_unit, 1.0 / self.twist_unit))
+
+
+def _kept(values: ArrayLike) -> Floats:
+    """Return an array that nobody can write to: all surfaces of a scaling share it."""
+    array = np.array(values)
+    array.setflags(write=False)
+    return array
 
 
 class InScaledVariables(ABC):

@@ -231,7 +231,7 @@ def test_segments_take_samples_whose_stamps_do_not_rise(stamps):
 
 
 def test_segments_refuse_what_is_no_number():
-    with pytest.raises(RangeError, match="turn_deg must be above 0"):
+    with pytest.raises(RangeError, match="turn_deg must be a finite number above 0"):
         Segments(SCALING, turn_deg=0.0)
     with pytest.raises(NotFiniteError):
         Segments(SCALING).feed(0.0, [np.inf, 0, 0], [1, 0, 0])

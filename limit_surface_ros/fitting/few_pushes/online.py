@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limit_surface_ros.checks import as_directions, as_floats
+from limit_surface_ros.checks import as_count, as_directions, as_floats, as_number, as_vector
 from limit_surface_ros.errors import DataError, LimitSurfaceError, RangeError
 from limit_surface_ros.fitting.few_pushes.calibration import calibrate
 from limit_surface_ros.fitting.few_pushes.mixture import ELLIPSOID, as_dissipation, mixed
@@ -100,12 +100,11 @@ class OnlineSurface:
         Raises:
             RangeError: The window is shorter than two pushes, or the forgetting out of (0, 1].
         """
-        if window < 2:
-            raise RangeError(f"window must be at least 2 pushes, got {window}")
-        if forgetting == "blend":
+        window = as_count("window", window, 2)
+        if isinstance(forgetting, str) and forgetting == "blend":
             rates = [1.0, _YOUNGER]
         else:
-            rates = [float(as_floats("forgetting", forgetting))]
+            rates = [as_number("forgetting", forgetting)]
             if not 0.0 < rates[0] <= 1.0:
                 raise RangeError(
                     f'forgetting must be above 0 and at most 1, or "blend", got {forgetting}'
@@ -141,8 +140,8 @@ class OnlineSurface:
             ZeroVectorError: One of them is zero.
         """
         pair = Pairs(
-            as_directions("wrench", wrench).reshape(1, 3),
-            as_directions("twist", twist).reshape(1, 3),
+            as_directions("wrench", as_vector("wrench", wrench))[np.newaxis],
+            as_directions("twist", as_vector("twist", twist))[np.newaxis],
         )
         load = pair.wrenches[0] / self._scaling.wrench_unit
         motion = pair.twists[0] / self._scaling.twist_unit

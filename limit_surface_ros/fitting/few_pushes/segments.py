@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.checks import as_floats
-from limit_surface_ros.errors import RangeError
+from limit_surface_ros.checks import as_positive, as_vector
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -63,7 +62,7 @@ class Segments:
                 come late, and counts like the others.
 
         Raises:
-            RangeError: A number is not above zero.
+            RangeError: A number is not above zero, or not finite.
         """
         numbers = {
             "turn_deg": turn_deg,
@@ -73,8 +72,7 @@ class Segments:
             "most_gap": most_gap,
         }
         for name, number in numbers.items():
-            if not number > 0.0:
-                raise RangeError(f"{name} must be above 0, got {number}")
+            as_positive(name, number)
         self._scaling = scaling
         self._turn = float(np.cos(np.radians(turn_deg)))
         self._least = least
@@ -100,10 +98,11 @@ class Segments:
             Mean wrench and unit (in scaled variables) mean twist of the segment, shape (3,) each.
 
         Raises:
+            ShapeError: Wrench or twist are no three numbers.
             NotFiniteError: A component is NaN or infinite.
         """
-        load = as_floats("wrench", wrench) / self._scaling.wrench_unit
-        motion = as_floats("twist", twist) / self._scaling.twist_unit
+        load = as_vector("wrench", wrench) / self._scaling.wrench_unit
+        motion = as_vector("twist", twist) / self._scaling.twist_unit
         speed = float(np.linalg.norm(motion))
         gap = self._stamp is not None and not abs(stamp - self._stamp) <= self._most_gap
         closed = self.close() if gap else None

@@ -57,7 +57,8 @@ class PowerSumGauge:
 
     def images_and_forms(self, loads: Floats) -> tuple[Floats, Floats]:
         """Return R_i f, shape (k, 3, m), and f' A_i f, shape (k, m)."""
-        images = self._stacked_roots.dot(loads).reshape(-1, 3, loads.shape[1])
+        terms = len(self._stacked_roots) // 3
+        images = self._stacked_roots.dot(loads).reshape(terms, 3, loads.shape[1])
         forms: Floats = np.einsum("kcm,kcm->km", images, images)
         if self._null is not None:
             forms[forms <= self._null * squared_lengths(loads)] = 0.0

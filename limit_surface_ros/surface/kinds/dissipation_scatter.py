@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limit_surface_ros.checks import as_floats
+from limit_surface_ros.checks import as_floats, as_number
 from limit_surface_ros.errors import DataError, RangeError
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 
@@ -196,7 +196,7 @@ def scatter_of(stored: Mapping[str, Any], surface: LimitSurface) -> TwistScatter
             matrices = np.zeros((len(entries), 3, 3))
             matrices[:, _UPPER[0], _UPPER[1]] = matrices[:, _UPPER[1], _UPPER[0]] = entries
             folds.append(matrices)
-        scale = float(as_floats("log_scale", stored["log_scale"]))
+        scale = as_number("log_scale", stored["log_scale"])
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise DataError(f"fit: uncertainty is not what fits write: {error}") from None
     return TwistScatter(surface.matrices, tuple(folds), scale)
