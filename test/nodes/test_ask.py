@@ -15,6 +15,7 @@ pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not b
 from limit_surface_ros.motion.linear_push import linearise_push
 from limit_surface_ros.motion.outline import Polygon
 from limit_surface_ros.nodes.ask import main
+from limit_surface_ros.nodes.clients.service_client import ServiceClient
 from limit_surface_ros.nodes.decay_node import DecayNode
 from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
 from process_helpers import WAIT
@@ -51,6 +52,24 @@ def test_a_load_is_asked_for_with_options(box, ask):
     twist = planar(given["twist"]["twist"], "linear", "angular")
     np.testing.assert_allclose(twist, surface.twist_of_wrench([3.0, 0.0, 0.1]), rtol=1e-6)
     assert given["load_factor"] == pytest.approx(surface.load_factor([3.0, 0.0, 0.1]), rel=1e-6)
+
+
+def test_a_client_that_ends_while_its_thread_works_ends_without_a_traceback(monkeypatch):
+    failures, begun = [], threading.Event()
+    monkeypatch.setattr(threading, "excepthook", failures.append)
+    with ServiceClient("leaves") as client:
+        nodes = client._executor.get_nodes
+
+        def slow_nodes():
+            begun.set()
+            # Long enough for the client to begin its end meanwhile.
+            threading.Event().wait(0.2)
+            return nodes()
+
+        monkeypatch.setattr(client._executor, "get_nodes", slow_nodes)
+        client._executor.wake()
+        assert begun.wait(WAIT)
+    assert not failures
 
 
 def test_fields_may_be_given_in_yaml_as_to_ros2(box, ask):

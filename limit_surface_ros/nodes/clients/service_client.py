@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.task import Future
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -42,7 +43,9 @@ class ServiceClient:
         self.node = rclpy.create_node(name, context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
-        self._thread = threading.Thread(target=self._executor.spin)
+        self._over = Future()
+        spin = self._executor.spin_until_future_complete
+        self._thread = threading.Thread(target=spin, args=(self._over,))
         self._thread.start()
         self._clients: dict[str, Any] = {}
 
@@ -56,9 +59,13 @@ class ServiceClient:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """End the thread first: a process that ends while it spins aborts."""
-        self._executor.shutdown()
+        """End the thread first: a process that ends while it spins aborts.
+
+        Only then the executor: rclpy's `shutdown` takes from one that spins what it needs.
+        """
+        self._over.set_result(None)
         self._thread.join()
+        self._executor.shutdown()
         self.node.destroy_node()
         self._context.try_shutdown()
 
