@@ -20,7 +20,7 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from std_srvs.srv import Trigger
 
 from limit_surface_ros.errors import LimitSurfaceError, UnavailableError, shortened
-from limit_surface_ros.nodes.serving import answers
+from limit_surface_ros.nodes.serving import answers, middleware
 from limit_surface_ros.nodes.serving.diagnostics import Health, InputAge
 from limit_surface_ros.nodes.serving.peers import LostMessages
 from limit_surface_ros.nodes.serving.waiting import Handling, Waiting
@@ -41,9 +41,10 @@ STREAM_DEPTH = 1000
 TAKEN_IN_A_TURN = 100
 # Requests that wait while one is answered: of more than the usual 10 the oldest would be lost.
 WAITING = 1000
-# The same of services whose replies may be long: as many are kept for clients that are slow to
-# take them or have stopped, and 64 answers to 10 000 rows are 20 MB.
-WAITING_LARGE = 64
+# The same of services whose replies may be long, and how many replies they keep for clients that
+# are slow to take them or have stopped. Where the middleware has one depth for both it is the
+# first; a client keeps 10 replies itself, its own and those to others, unless it asks for more.
+WAITING_LARGE, KEPT_LARGE = 64, 12
 # Messages of one topic that wait, for a transform say; of more the oldest is refused.
 MOST_WAITING = 500
 
@@ -137,7 +138,9 @@ class Endpoints:
         def handler(request: Any, response: Any) -> Any:
             return service.handler(self._node, request, response)
 
-        depth = WAITING_LARGE if service.long or _has_lists(service.type.Response) else WAITING
+        depth = WAITING
+        if service.long or _has_lists(service.type.Response):
+            depth = KEPT_LARGE if middleware.requests_wait_apart() else WAITING_LARGE
         self._serve(service.type, service.name, handler, refused, check, depth)
 
     def serve_trigger(self, name: str, handler: Callable[[Any, Any], Any], unchanged: str) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
+from rclpy.utilities import get_rmw_implementation_identifier
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -34,6 +35,16 @@ def settings() -> Iterator[None]:
         yield
     finally:
         del os.environ[VARIABLE]
+
+
+def requests_wait_apart() -> bool:
+    """Return whether nodes that are made now have queues of requests that the file gives a depth.
+
+    Elsewhere a service has one depth for its requests and for the replies that it keeps.
+    """
+    file = _shipped()
+    ours = file is not None and os.environ.get(VARIABLE) == str(file)
+    return ours and get_rmw_implementation_identifier().startswith("rmw_fastrtps")
 
 
 def _shipped() -> Path | None:
