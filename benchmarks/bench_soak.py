@@ -13,6 +13,7 @@ answer was lost or wrong, or a goal of a hard case missed.
 from __future__ import annotations
 
 import contextlib
+import functools
 import multiprocessing
 import sys
 import time
@@ -153,7 +154,10 @@ def hard_cases(load: Load, prefix: str, node: subprocess.Popen[bytes]) -> bool:
     for case in (
         lambda: soak_hard.long_batches(load.pool, prefix, 2.0 * ROW_SECONDS),
         lambda: soak_hard.many_clients(load.pool, prefix, ROW_SECONDS),
-        lambda: soak_hard.stopped_client(load.pool, prefix, node),
+        *(
+            functools.partial(soak_hard.stopped_client, load.pool, prefix, node, *each)
+            for each in soak_hard.STOPPED
+        ),
         lambda: soak_hard.moving_frame(load.pool, ROW_SECONDS),
     ):
         row, good = case()

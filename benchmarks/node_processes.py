@@ -20,13 +20,17 @@ if TYPE_CHECKING:
 FOLDER = Path(__file__).parent
 OURS = [sys.executable, "-m", "limit_surface_ros.nodes.limit_surface_node"]
 OURS_DECAY = [sys.executable, "-m", "limit_surface_ros.nodes.decay_node"]
+_claims: list[Any] = []
 BARE = [sys.executable, str(FOLDER / "bare_node.py"), "bare"]
 
 
 def isolate() -> None:
-    """Keep this run's nodes among themselves."""
-    os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    """Keep this run's nodes among themselves, in a ROS domain that no other run here has."""
+    sys.path.insert(0, str(FOLDER.parent / "scripts" / "ros_setup"))
+    from environment import isolate_discovery
+
+    # As long as this process lives.
+    _claims.append(isolate_discovery(os.environ, FOLDER.parent / "log" / "ros"))
 
 
 @contextlib.contextmanager

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistStamped, WrenchStamped
 from limit_surface_interfaces.srv import WrenchesToTwists, WrenchToTwist
 from node_processes import wrench_message
@@ -39,6 +40,8 @@ WRENCH = (2.0, 1.0, 0.05)
 BAD = 100
 # After so long an answer counts as lost [s].
 LOST = 5.0
+# After so long without any answer a stream does not begin [s].
+UNHEARD = 30.0
 # A stream ends so long before its load does [s].
 LAST = 0.5
 # Stamp [s] of wrenches that are sent before a stream begins.
@@ -106,7 +109,7 @@ def _wait_for_an_answer(node: Node, prefix: str, publisher: Any) -> None:
     publisher already: on a busy machine that takes some tenths of a second, and what is sent
     meanwhile is not lost, but was never received.
     """
-    known = False
+    known, end = False, time.perf_counter() + UNHEARD
 
     def note(_: TwistStamped) -> None:
         nonlocal known
@@ -118,6 +121,12 @@ def _wait_for_an_answer(node: Node, prefix: str, publisher: Any) -> None:
     message = wrench_message(WRENCH)
     message.header.stamp.sec = NEVER
     while not known:
+        if time.perf_counter() > end:
+            raise RuntimeError(
+                f"no twist from {prefix} in {UNHEARD:g} s: its subscription matched "
+                f"{publisher.get_subscription_count()} times, its publisher "
+                f"{node.count_publishers(subscription.topic_name)} times"
+            )
         publisher.publish(message)
         executor.spin_until_future_complete(Future(), timeout_sec=0.1)
     executor.shutdown()
@@ -253,10 +262,16 @@ def _reloads(client: Any, total: Calls) -> Callable[[], None]:
     return lambda: client.call_async(Trigger.Request()).add_done_callback(count)
 
 
-def moving_stream(prefix: str, seconds: float) -> Stream:
-    """Send wrenches stamped now in a moving frame, and time the twists."""
+def moving_stream(prefix: str, seconds: float) -> tuple[Stream, str]:
+    """Send wrenches stamped now in a moving frame, and time the twists.
+
+    Returns:
+        What became of them, and what the node says of them if one was not answered: whether it
+        never heard it, refused it, or its answer was lost on the way.
+    """
     seen = Stream()
     due: dict[tuple[int, int], float] = {}
+    told: dict[str, str] = {}
 
     def take(message: TwistStamped) -> None:
         stamp = message.header.stamp
@@ -265,7 +280,12 @@ def moving_stream(prefix: str, seconds: float) -> Stream:
             seen.answered += 1
             seen.delays.append(time.perf_counter() - start)
 
-    with _spinning("soak_moving", seconds + 1.0) as node:
+    def note(message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name == prefix.lstrip("/"):
+                told.update((each.key, each.value) for each in status.values)
+
+    with _spinning("soak_moving", seconds + 2.5) as node:
 
         def send() -> None:
             if time.perf_counter() > end:
@@ -277,15 +297,13 @@ def moving_stream(prefix: str, seconds: float) -> Stream:
             publisher.publish(message)
 
         node.create_subscription(TwistStamped, f"{prefix}/predicted_twist", take, DEEP)
+        node.create_subscription(DiagnosticArray, "/diagnostics", note, 10)
         publisher = node.create_publisher(WrenchStamped, f"{prefix}/wrench", DEEP)
-        while not publisher.get_subscription_count():
-            time.sleep(0.01)
-        while not node.count_publishers(f"{prefix}/predicted_twist"):
-            time.sleep(0.01)
-        time.sleep(1.0)
+        _wait_for_an_answer(node, prefix, publisher)
         end = time.perf_counter() + seconds
         node.create_timer(1.0 / 200.0, send)
-    return seen
+    words = (f"{key} {value}" for key, value in told.items() if " wrench" in key)
+    return seen, "" if seen.answered == seen.sent else f"; the node: {', '.join(words)}"
 
 
 def batches(prefix: str, seconds: float, rows: int) -> Calls:
