@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
@@ -17,6 +19,7 @@ from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_mod
 from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
 from limit_surface_ros.nodes.messages import convert
 from limit_surface_ros.nodes.serving import batches
+from limit_surface_ros.nodes.serving.waiting import Handling
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.scaling import Scaling
 from node_helpers import stamp_message, wrench_message
@@ -100,3 +103,30 @@ def test_more_than_may_wait_is_refused_and_not_lost(ros, slow, monkeypatch):
     assert ros.done(first, WAIT)
     assert ros.done(waits, WAIT)
     assert waits.result().error_code == ErrorCode.NONE
+
+
+def test_of_several_long_batches_of_pushes_one_at_a_time_has_begun(ros, slow):
+    node, _ = slow
+    begun, over, gate = [], [], []
+
+    def stages(name):
+        begun.append(name)
+        while name == "long" and not gate:
+            yield
+            # A slice is over: others have their turns.
+            time.sleep(batches.SLICE)
+        return name
+
+    async def run(name, rows):
+        over.append(await node.batches.run_stages(rows, stages(name)))
+
+    def begin():
+        for name, rows in (("long", 1000), ("next", 1000), ("short", 10)):
+            Handling(lambda _: None, run, (name, rows), lambda _: None).begin()
+
+    ros.executor.create_task(begin)
+    ros.wait(lambda: over == ["short"])
+    assert begun == ["long", "short"]
+    gate.append("open")
+    ros.wait(lambda: len(over) == 3)
+    assert begun == ["long", "short", "next"]

@@ -95,7 +95,8 @@ async def simulate_many(
         )
     pushing = _pushing(node, model, outline_of(model, request), request)
     stages = pushing.along_each(poses, np.stack([starts, ends], axis=1))
-    runs = await in_turns(node.endpoints, stages)
+    # Each begun keeps its poses and contacts: of several long ones, one at a time.
+    runs = await node.batches.run_stages(len(poses), stages)
     answer = SimulatePushes.Response
     outcomes = np.where(np.isnan(runs.left_at), answer.TOUCHES, answer.LEAVES)
     outcomes = np.where(np.isnan(runs.touched_at), answer.MISSES, outcomes)

@@ -28,6 +28,8 @@ SLICE = 0.003
 # Rows of the first slice of all, of which it is learnt how long rows take; a batch of so many is
 # answered in one slice and waits for no other.
 FIRST_ROWS = 1024
+# The same of pushes, which take longer.
+FIRST_PUSHES = 64
 # Taking so many rows from the middleware, and giving the answer to it, takes a millisecond each:
 # others have a turn after the one and before the other.
 LARGE_ROWS = 100_000
@@ -91,9 +93,30 @@ class Batches:
                     await self._endpoints.give_way()
             self._endpoints.last_large = time.monotonic()
         finally:
-            self._running = bool(self._queue)
-            if self._queue and not self._endpoints.ending:
-                self._queue.popleft().settle()
+            self._begin_next()
+
+    async def run_stages(self, rows: int, stages: Generator[None, None, Found]) -> Found:
+        """Return what a generator returns that does long work on all rows at once.
+
+        Args:
+            rows: Number of rows; of up to `FIRST_PUSHES` they wait for no other batch.
+            stages: Pauses now and then; others have their turns at its pauses.
+
+        Raises:
+            UnavailableError: Too much waits already, or the node is ending.
+        """
+        if rows <= FIRST_PUSHES:
+            return await in_turns(self._endpoints, stages)
+        await self._wait_for_turn(56 * rows)
+        try:
+            return await in_turns(self._endpoints, stages)
+        finally:
+            self._begin_next()
+
+    def _begin_next(self) -> None:
+        self._running = bool(self._queue)
+        if self._queue and not self._endpoints.ending:
+            self._queue.popleft().settle()
 
     async def _wait_for_turn(self, size: int) -> None:
         if not self._running:
