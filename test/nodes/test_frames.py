@@ -16,6 +16,7 @@ from geometry_msgs.msg import PoseStamped, TransformStamped
 from limit_surface_interfaces.msg import ErrorCode
 from limit_surface_interfaces.srv import (
     ListModels,
+    PredictSlide,
     SimulatePush,
     TwistsToWrenches,
     TwistToWrench,
@@ -25,6 +26,8 @@ from limit_surface_interfaces.srv import (
 from rclpy.parameter import Parameter
 from std_msgs.msg import Header
 
+from decay_helpers import Bench
+from limit_surface_ros.motion.outline import Polygon
 from limit_surface_ros.nodes.limit_surface_node import LimitSurfaceNode
 from limit_surface_ros.nodes.messages import convert
 from node_helpers import STAMP, planar_twist, planar_wrench, twist_message, wrench_message
@@ -217,6 +220,27 @@ def test_a_very_long_frame_of_a_path_is_not_repeated_whole(ros, client_node, ser
     answer = call(asked)
     assert answer.error_code == ErrorCode.UNKNOWN_FRAME
     assert len(answer.error_msg) < 1000
+
+
+def test_a_frame_that_an_answer_repeats_is_not_a_megabyte_long(ros, client_node, serve, tmp_path):
+    serve(outline=Polygon([(-0.1, -0.1), (0.1, -0.1), (0.0, 0.1)]))
+    bench = Bench(ros, client_node, tmp_path, sim_time=False)
+    long = "x" * 1_000_000
+    pushed = SimulatePush.Request()
+    pushed.header.frame_id = long
+    pushed.tip_path.poses = [PoseStamped(), PoseStamped()]
+    call = ros.client(client_node, SimulatePush, "/limit_surface/simulate_push")
+    slid = PredictSlide.Request(points=100_000)
+    slid.pose.header.frame_id = long
+    for answer in (
+        call(pushed),
+        ros.client(client_node, PredictSlide, "/decay/predict_slide")(slid),
+    ):
+        assert answer.error_code == ErrorCode.OUT_OF_RANGE
+        assert "frame_id must have at most 200 characters" in answer.error_msg
+        assert len(answer.error_msg) < 1000
+    bench.onset(bench.now, frame=long)
+    assert bench.refused["onset", "OUT_OF_RANGE"] == 1
 
 
 def test_a_frame_without_a_transform_is_refused_with_both_named(serve):

@@ -41,7 +41,8 @@ class Onset:
 
     Raises:
         NotFiniteError: A component is NaN or infinite.
-        RangeError: A component is larger than 1e100, or the stamp is before time zero.
+        RangeError: A component is larger than 1e100, the stamp is before time zero, or the frame
+            is longer than names are.
         ZeroVectorError: The load is zero.
         NoOnsetError: The model starts at zero.
     """
@@ -58,6 +59,7 @@ class Onset:
         self.load = np.array(convert.wrench_components(message.wrench))
         if not np.abs(self.load).max() >= convert.SMALLEST:
             raise ZeroVectorError("an onset must not be zero: nothing would die away")
+        convert.copied_frame(message.header.frame_id)
         self.start = nanoseconds(message.header.stamp) or now
         self.message = message
         fill_stamp(message.header.stamp, self.start)

@@ -132,7 +132,7 @@ def _start_of(node: Any, model: SurfaceModel, stamped: PoseStamped) -> Start:
             "pose.orientation must turn about z alone: the body slides in the plane of x and y"
         )
     time = nanoseconds(stamped.header.stamp) or int(node.get_clock().now().nanoseconds)
-    frame = stamped.header.frame_id or node.input.policy.frame_of(model)
+    frame = convert.copied_frame(stamped.header.frame_id) or node.input.policy.frame_of(model)
     return Start((x, y, 2.0 * math.atan2(k, w)), z, time, frame)
 
 

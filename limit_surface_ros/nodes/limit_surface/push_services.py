@@ -48,6 +48,7 @@ async def simulate_one(
     """Answer `~/simulate_push`."""
     model = node.host.models[request.model]
     tips, stamps = _tips(request)
+    frame = convert.copied_frame(request.header.frame_id)
     outline = outline_of(model, request)
     stages = _pushing(node, model, outline, request).along(
         _planar_pose("start", request.start), tips
@@ -63,7 +64,7 @@ async def simulate_one(
     response.body_path.header = request.header
     for pose, later in zip(run.poses.tolist(), times.tolist(), strict=True):
         stamped = PoseStamped()
-        stamped.header.frame_id = request.header.frame_id
+        stamped.header.frame_id = frame
         convert.fill_stamp(stamped.header.stamp, first + round(later))
         _fill_pose(stamped.pose, pose)
         response.body_path.poses.append(stamped)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from limit_surface_ros.checks import LARGEST, SMALLEST
+from limit_surface_ros.checks import LARGEST, SMALLEST, as_name
 from limit_surface_ros.errors import (
     LimitSurfaceError,
     NotFiniteError,
@@ -86,6 +86,15 @@ def _checked(values: tuple[float, ...], names: tuple[str, ...]) -> tuple[float, 
         if abs(value) > LARGEST:
             raise RangeError(f"{name} must be at most {LARGEST:g} in size, got {value:g}")
     return values
+
+
+def copied_frame(frame: str) -> str:
+    """Return a frame that each pose or wrench of an answer repeats; empty stays empty.
+
+    Raises:
+        RangeError: It is so long, or so strange, that the answer would be of gigabytes.
+    """
+    return as_name("frame_id", frame) if frame else frame
 
 
 def fill_wrench(message: Wrench, wrench: Sequence[float]) -> None:
