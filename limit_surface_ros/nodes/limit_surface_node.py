@@ -132,6 +132,10 @@ class LimitSurfaceNode(ModelNode[SurfaceModel]):
         learner = self.learner.describe() if self.learner is not None else {}
         return super().describe() | learner
 
+    def stand_in(self, default: str) -> str:
+        """Return the prior of a default model that is going to be learnt."""
+        return learning.prior_of(default, self.values)
+
     def destroy_node(self) -> None:
         """Stop learning, and the node."""
         if self.learner is not None:

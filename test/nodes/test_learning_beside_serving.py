@@ -266,6 +266,15 @@ def test_a_node_ends_whose_learning_process_does_not_answer(ros, client_node, pr
     ros.wait(lambda: not process.is_alive())
 
 
+def test_what_is_going_to_be_learnt_can_be_the_default_from_the_start(ros, prior):
+    wanted = {"default_model": "body_learnt"}
+    node = ros.add(LimitSurfaceNode, files=[prior], parameters={"learn": True, **wanted})
+    assert (node.host.models.default, node.learner.name) == ("body_learnt", "body_learnt")
+    for others in ({}, {"learn": True, "learn_prior": "absent"}):
+        with pytest.raises(UnknownModelError, match="no model"):
+            ros.add(LimitSurfaceNode, files=[prior], parameters={**wanted, **others})
+
+
 def test_what_learning_cannot_begin_with_is_refused(ros, prior, tmp_path):
     with pytest.raises(UnknownModelError, match="no model 'absent'"):
         ros.add(

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from std_srvs.srv import Trigger
 
     from limit_surface_ros.fitting.few_pushes.online import Update
+    from limit_surface_ros.nodes.serving.parameters import Parameters
 
 SETTINGS = (
     Setting(
@@ -77,6 +78,13 @@ _TOLD = 10
 _MOST_ENDS = 3
 # Between looks whether the node is run, or ends [s].
 _PAUSE = 0.02
+
+
+def prior_of(name: str, values: Parameters) -> str:
+    """Return the prior of the model that the parameters have learnt, if it is `name`; else ""."""
+    prior = name.removesuffix(LEARNT)
+    named = values["learn_prior"]
+    return prior if values["learn"] and prior != name and named in ("", prior) else ""
 
 
 class _ClosedError(Exception):

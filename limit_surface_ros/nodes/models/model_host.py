@@ -61,6 +61,7 @@ class ModelHost(Generic[Model]):
         files: Name of the parameter that names the files.
         default: Name of the parameter that names the default model.
         noun: What a request calls such a model, for messages.
+        stand_in: Tells which model stands for a default that `add` brings later; "": none does.
 
     Attributes:
         models: The models; replaced as a whole.
@@ -82,9 +83,13 @@ class ModelHost(Generic[Model]):
         default: str = "default_model",
         noun: str = "model",
         prepare: Callable[[Model], object] | None = None,
+        stand_in: Callable[[str], str] | None = None,
     ) -> None:
         """Read the models that the parameters name."""
         self._noun = noun
+        self._stand_in = stand_in
+        # The default that is not there yet.
+        self._awaited = ""
         self._read = read
         self._warn = warn
         self._prepare_one = prepare
@@ -99,7 +104,8 @@ class ModelHost(Generic[Model]):
     def add(self, model: Model) -> None:
         """Serve a model that comes from no file, in place of one of its name."""
         self._added[model.name] = model
-        self.models = self.models.joined([model])
+        awaited, self._awaited = self._awaited, ""
+        self.models = self.models.joined([model], awaited if awaited == model.name else "")
 
     @property
     def summary(self) -> str:
@@ -144,6 +150,9 @@ class ModelHost(Generic[Model]):
     ) -> tuple[ModelSet[Model], ModelSet[Model]]:
         """Return what the files hold, and that with what was added."""
         models = read_model_set(resolved(files), self._read, noun=self._noun)
+        stand_in = self._stand_in(default) if self._stand_in is not None else ""
+        if stand_in and not self._added:
+            self._awaited, default = default, stand_in
         try:
             return models, models.joined(self._added.values(), default)
         except UnknownModelError as error:

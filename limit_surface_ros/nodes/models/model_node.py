@@ -68,7 +68,8 @@ class ModelNode(Node, Generic[Model]):
         self.health = diagnostics.Health()
         try:
             self.values = Parameters(self, [*settings, *COMMON_SETTINGS])
-            self.host = ModelHost(self.values, read, self.get_logger().warning, prepare=prepare)
+            warn = self.get_logger().warning
+            self.host = ModelHost(self.values, read, warn, prepare=prepare, stand_in=self.stand_in)
         except Exception:
             self.destroy_node()
             raise
@@ -88,6 +89,10 @@ class ModelNode(Node, Generic[Model]):
     def describe(self) -> dict[str, str]:
         """Return what diagnostics say beside counts and times."""
         return {"model": self.host.models.default, "models": str(len(self.host.models))}
+
+    def stand_in(self, default: str) -> str:
+        """Return which model stands for a default model that is made only later; "": none."""
+        return ""
 
     def add_models(
         self,
