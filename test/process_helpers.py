@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Programs in process groups of their own, none of which outlives its test."""
 
+import functools
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -12,6 +14,27 @@ REPOSITORY = Path(__file__).parents[1]
 # How long a test waits for what must come, on the busiest machine [s].
 WAIT = 300.0
 _STARTED: list[subprocess.Popen] = []
+_CLAIMS: list[socket.socket] = []
+
+
+@functools.cache
+def own_domain(use: str) -> dict[str, str]:
+    """Return variables of a ROS domain that nothing else on this machine has, one for each `use`.
+
+    Claimed as `scripts/with_ros --isolated` does, for as long as this process lives: its programs
+    must not be heard either.
+    """
+    claim = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    for offset in range(101):
+        # Anywhere: what ended a moment ago may still be heard in its domain.
+        domain = 1 + (os.getpid() + offset) % 101
+        try:
+            claim.bind(f"\0limit_surface_ros/domain/{domain}")
+        except OSError:
+            continue
+        _CLAIMS.append(claim)
+        return {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    raise RuntimeError(f"all ROS domains are taken by other runs; none is left for {use}")
 
 
 def until(condition, what: str, seconds: float = WAIT):

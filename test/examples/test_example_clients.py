@@ -14,6 +14,7 @@ import pytest
 
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
+from process_helpers import own_domain
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 PROGRAMS = [EXAMPLES / "python_client.py", EXAMPLES / "cpp_client" / "cpp_client.cpp"]
@@ -27,9 +28,8 @@ def test_an_example_has_fewer_than_60_lines(path):
 
 @pytest.fixture
 def environment():
-    """The environment of a test run, in a ROS domain that only this test uses."""
-    domain = str(101 + os.getpid() % 100)
-    return os.environ | {"ROS_DOMAIN_ID": domain, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    """The environment of a test run, in a ROS domain that only examples use."""
+    return os.environ | own_domain("examples")
 
 
 def test_the_python_client_prints_what_the_library_says(tmp_path, environment):

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-import socket
 import threading
 from pathlib import Path
 
@@ -14,29 +13,9 @@ import pytest
 from limit_surface_ros.files.surface_file import SurfaceModel, write_surface_model
 from limit_surface_ros.surface.kinds.power_sum import PowerSum
 from limit_surface_ros.surface.scaling import Scaling
-from process_helpers import WAIT
+from process_helpers import WAIT, own_domain
 
-
-def _own_domain() -> tuple[int, socket.socket]:
-    """Return a ROS domain that nothing else on this machine has, and what keeps it.
-
-    Claimed as `scripts/with_ros --isolated` does: its programs must not be heard either.
-    """
-    claim = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    for offset in range(101):
-        # Anywhere: what ended a moment ago may still be heard in its domain.
-        domain = 1 + (os.getpid() + offset) % 101
-        try:
-            claim.bind(f"\0limit_surface_ros/domain/{domain}")
-        except OSError:
-            continue
-        return domain, claim
-    raise RuntimeError("all ROS domains are taken by other runs")
-
-
-_DOMAIN, _LOCK = _own_domain()
-os.environ["ROS_DOMAIN_ID"] = str(_DOMAIN)
-os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+os.environ |= own_domain("nodes of this process")
 
 
 class Spinner:
