@@ -17,7 +17,13 @@ class NotJoined(Exception):
 
 
 class Buffer:
-    """Where `child` is along the x axis of `parent`, by stamp."""
+    """Where `child` is along the x axis of `parent`, by stamp.
+
+    Attributes:
+        rotation: Quaternion (x, y, z, w) of every transform, as it was published.
+    """
+
+    rotation = (0.0, 0.0, 0.0, 1.0)
 
     def __init__(self, parent="object", child="tool"):
         self._frames = {parent, child}
@@ -56,5 +62,6 @@ class Buffer:
             x = self._places[place - 1] + share * (x - self._places[place - 1])
         pose = TransformStamped()
         pose.transform.translation.x = x if source == self._child else -x
-        pose.transform.rotation.w = 1.0
+        turned = pose.transform.rotation
+        turned.x, turned.y, turned.z, turned.w = self.rotation
         return pose

@@ -221,6 +221,39 @@ def test_diagnostics_name_what_is_refused_before_they_say_that_nothing_comes(
     timer.cancel()
 
 
+@pytest.mark.parametrize(
+    ("rotation", "x", "reason"),
+    [
+        ((0.0, 0.0, 0.0, 0.0), 0.1, "quaternion must not be zero"),
+        ((0.0, float("nan"), 0.0, 1.0), 0.1, "quaternion must be finite"),
+        ((0.0, 0.0, 0.0, 1.0), 1e300, "translation must be at most 1e+100 m"),
+        ((0.0, 0.0, 0.0, 1.0), float("inf"), "translation must be finite"),
+    ],
+)
+def test_of_a_transform_that_cannot_be_used_the_message_names_the_transform(
+    moving, rotation, x, reason
+):
+    bench = moving()
+    bench.buffer.rotation = rotation
+    bench.come(10 * SECOND, x)
+    answer = bench.ask(10 * SECOND)
+    assert bench.ros.done(answer, WAIT)
+    assert answer.result().error_code == ErrorCode.UNKNOWN_FRAME
+    said = answer.result().error_msg
+    assert "transform from frame 'tool' to the model's frame 'object' cannot be used" in said
+    assert reason in said
+    assert "wrench" not in said
+    bench.publish(10 * SECOND)
+    assert bench.node.health.refused["wrench", "UNKNOWN_FRAME"] == 1
+    # The next one that is in order is used, and needs no unit length.
+    bench.buffer.rotation = (0.0, 0.0, 0.0, -7e-5)
+    bench.come(11 * SECOND, 0.1)
+    answer = bench.ask(11 * SECOND)
+    assert bench.ros.done(answer, WAIT)
+    twist = planar_twist(answer.result().twist)
+    np.testing.assert_allclose(twist, bench.expected(0.1), rtol=1e-9)
+
+
 @pytest.mark.skipif(
     importlib.util.find_spec("tf2_ros") is None, reason="tf2_ros is not installed (no wheel of it)"
 )

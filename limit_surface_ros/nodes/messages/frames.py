@@ -16,8 +16,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rclpy.clock import Clock, ClockType
 from rclpy.time import Time
 
+from limit_surface_ros.checks import LARGEST
 from limit_surface_ros.errors import (
     FrameError,
+    LimitSurfaceError,
     TransformTooNewError,
     TransformTooOldError,
     UnavailableError,
@@ -134,7 +136,8 @@ class Frames:
         Waits for it as long as the parameters say if it is not there yet.
 
         Raises:
-            FrameError: The frame is empty, or no transform is known.
+            FrameError: The frame is empty, no transform is known, or the one that is known has
+                no rotation, or a translation that is not finite or beyond 1e100 m.
             TransformTooOldError: The stamp is older than all that tf2 remembers.
             TransformTooNewError: The stamp is newer than what tf2 has received.
             UnavailableError: Too many wait already.
@@ -150,7 +153,7 @@ class Frames:
                 "transform to it, or set the parameter assume_model_frame"
             )
         if self._buffer is None or (source in self._static and target in self._static):
-            return self._static.look_up(target, source)
+            return _usable(self._static.look_up(target, source), target, source)
         stamp = nanoseconds(header.stamp)
         try:
             return self._look_up(target, source, stamp)
@@ -171,9 +174,13 @@ class Frames:
             when = self._newest_in_place_of(target, source, stamp, reason)
         pose = buffer.lookup_transform(target, source, when).transform
         moved, turned = pose.translation, pose.rotation
-        return RigidTransform.from_quaternion(
-            [moved.x, moved.y, moved.z], [turned.x, turned.y, turned.z, turned.w]
-        )
+        try:
+            transform = RigidTransform.from_quaternion(
+                [moved.x, moved.y, moved.z], [turned.x, turned.y, turned.z, turned.w]
+            )
+        except LimitSurfaceError as error:
+            raise _unusable(target, source, str(error)) from None
+        return _usable(transform, target, source)
 
     def _newest_in_place_of(self, target: str, source: str, stamp: int, reason: str) -> Time:
         """Return the newest time that is known if it will do, or raise what is wrong."""
@@ -250,6 +257,26 @@ class Frames:
             self._static = static
 
         return apply
+
+
+def _usable(transform: RigidTransform, target: str, source: str) -> RigidTransform:
+    """Return a transform with which no vector overflows that is accepted.
+
+    Otherwise the wrench or twist would be said not to be finite, which is in order.
+    """
+    translation = transform.translation.tolist()
+    if not all(abs(coordinate) <= LARGEST for coordinate in translation):
+        raise _unusable(
+            target, source, f"its translation must be at most {LARGEST:g} m, got {translation}"
+        )
+    return transform
+
+
+def _unusable(target: str, source: str, reason: str) -> FrameError:
+    return FrameError(
+        f"the transform from frame {_shown(source)} to the model's frame {_shown(target)} cannot "
+        f"be used: {reason}"
+    )
 
 
 def _shown(frame: str) -> str:
