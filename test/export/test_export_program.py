@@ -71,14 +71,12 @@ def test_wrong_targets_and_places_are_refused(model_file, capsys):
 
 STRANGE_NAMES = [
     "*/ x",
-    "a\nb",
     'tri"""ple',
     "back\\slash\\",
     "\\U",
     "@NAME@",
-    "x\u2028y",
     "--><x>",
-    "\u03c0" * 400,
+    "\u03c0" * 200,
 ]
 
 
