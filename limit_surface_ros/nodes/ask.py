@@ -3,7 +3,8 @@
 
 It stands in for `ros2 service call`, `ros2 topic echo` and `ros2 topic pub --once` where there is
 no `ros2`. Without a name it lists what the nodes that run here can be asked. What is not given of
-a message is zero; a frame that is not given is that of the model.
+a message is zero; a frame that is not given is that of the request's own header, or else that of
+the model, which the decay node does not tell.
 """
 
 from __future__ import annotations
@@ -29,15 +30,17 @@ EXAMPLES = """examples:
   ask wrench_to_twist --force 3 0 --torque 0.1
   ask twist_to_wrench --velocity 1 0 --turning 0.5 --model triangle
   ask push --at 0 0.04 --normal 0 -1 --friction 0.3 --velocity 0 -0.01
-  ask predict_stop --force 9 2
+  ask predict_stop --force 9 2 --frame object
   ask limit_surface/list_models
   ask predicted_twist --count 3                  listen to a topic
   ask onset --send --force 9 2                   send one message
 
 Fields that no option names are given in YAML, as to ros2:
   ask evaluate '{times: [0.0, 0.5, 1.0]}'
+  ask linearise_push '{contact: {x: -0.05, y: 0.01}, input: [0.02, 0.0]}' --friction 0.3
 
-docs/tutorials/first_hour.md shows it at work; README.md lists services and topics.
+docs/tutorials/first_hour.md shows it at work; README.md lists services and topics, and
+limit_surface_interfaces/srv says what their fields are.
 """
 # Where an option's numbers go: the first of these paths that a message has.
 PATHS = {
@@ -217,7 +220,9 @@ def show(services: Names, topics: Names, wait: float) -> int:
 
 def call(client: ServiceClient, name: str, kind: Any, options: argparse.Namespace) -> int:
     """Call a service and print what it answers."""
-    request = filled(kind.Request(), options, lambda: frame_of(client, name, options))
+    request = filled(
+        kind.Request(), options, lambda model: frame_of(client, name, model, options.wait)
+    )
     response = client.call(kind, name, request, options.wait)
     print(text_of(response))
     code = getattr(response, "error_code", ErrorCode.NONE)
@@ -229,7 +234,7 @@ def call(client: ServiceClient, name: str, kind: Any, options: argparse.Namespac
 
 def send(client: ServiceClient, name: str, kind: Any, options: argparse.Namespace) -> int:
     """Send one message to whoever listens."""
-    message = filled(kind(), options, lambda: frame_of(client, name, options))
+    message = filled(kind(), options, lambda model: frame_of(client, name, model, options.wait))
     publisher = client.node.create_publisher(kind, name, 1)
     end = time.monotonic() + options.wait
     while not publisher.get_subscription_count():
@@ -273,7 +278,7 @@ def qos_of(node: Any, topic: str) -> QoSProfile:
     return qos
 
 
-def filled(message: Any, options: argparse.Namespace, frame: Callable[[], str]) -> Any:
+def filled(message: Any, options: argparse.Namespace, frame: Callable[[str], str]) -> Any:
     """Return a message with the fields that the command line gives.
 
     Raises:
@@ -289,8 +294,13 @@ def filled(message: Any, options: argparse.Namespace, frame: Callable[[], str]) 
         value = getattr(options, option)
         if value is not None:
             fill(message, nested(message, option, paths, value))
-    for header in headers(message):
-        header.frame_id = options.frame or header.frame_id or frame()
+    unnamed = [each for each in headers(message) if options.frame or not each.frame_id]
+    if unnamed:
+        # A path in a request is in the frame of the request.
+        own = getattr(getattr(message, "header", None), "frame_id", "")
+        shared = options.frame or own or frame(getattr(message, "model", ""))
+        for header in unnamed:
+            header.frame_id = shared
     return message
 
 
@@ -320,21 +330,37 @@ def headers(message: Any) -> Iterator[Any]:
             yield from headers(value)
 
 
-def frame_of(client: ServiceClient, name: str, options: argparse.Namespace) -> str:
+def frame_of(client: ServiceClient, name: str, model: str, wait: float) -> str:
     """Return the frame of the model that a node is asked about, empty if it tells none."""
     lists = f"{name.rpartition('/')[0]}/list_models"
     kind = dict(client.node.get_service_names_and_types()).get(lists)
     if not kind:
         return ""
     service = type_of(kind[0])
-    models = client.call(service, lists, service.Request(), options.wait).models
-    named = [each for each in models if not options.model or each.name == options.model]
+    models = client.call(service, lists, service.Request(), wait).models
+    named = [each for each in models if not model or each.name == model]
     return str(getattr(named[0], "frame_id", "")) if named else ""
 
 
 def text_of(message: Any) -> str:
-    """Return a message as YAML."""
-    return str(yaml.safe_dump(plain(message), sort_keys=False, default_flow_style=None)).rstrip()
+    """Return a message as YAML, texts of several lines as such."""
+    return str(
+        yaml.dump(plain(message), Dumper=_Readable, sort_keys=False, default_flow_style=None)
+    ).rstrip()
+
+
+class _Readable(yaml.SafeDumper):
+    """Writes texts of several lines line by line."""
+
+
+def _text(dumper: _Readable, text: str) -> yaml.ScalarNode:
+    """Represent a text."""
+    return dumper.represent_scalar(
+        "tag:yaml.org,2002:str", text, style="|" if "\n" in text else None
+    )
+
+
+_Readable.add_representer(str, _text)
 
 
 def code_name(code: int) -> str:

@@ -25,7 +25,7 @@ targets:
   jax        module of JAX functions: the closed forms, differentiable as often as one likes
   js         module for browsers and Node.js
   mujoco     MJCF model of the body on --spheres spheres with torsional friction
-  ellipsoid  the matrix L of twist = L wrench that is closest, with its error
+  ellipsoid  the matrix L of twist = L wrench that is closest, with its error: NAME_ellipsoid.yaml
 
 Each file is one fixed text with the model's numbers in it, to the last bit. A map that cannot be
 certified, as the load of a twist of a surface that is not convex, is left out and named.
@@ -64,7 +64,9 @@ def run(options: argparse.Namespace) -> None:
     """Read, export, write."""
     suffix = SUFFIXES[options.to]
     model = read_surface_model(options.model)
-    output = options.output or Path(f"{model.name}{suffix}")
+    # NAME.yaml would be the model's own file, or that of its contact.
+    ending = "_ellipsoid" if options.to == "ellipsoid" else ""
+    output = options.output or Path(f"{model.name}{ending}{suffix}")
     accepted = [".hpp", ".h", ".hh", ".hxx"] if options.to == "cpp" else [suffix]
     check_output(output, [*accepted, *([".js"] if options.to == "js" else [])], [options.model])
     exported = export_surface(model, options.to, options.spheres)

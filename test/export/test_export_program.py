@@ -29,7 +29,8 @@ def model_file(tmp_path, monkeypatch):
 @pytest.mark.parametrize("target", SUFFIXES)
 def test_each_target_is_written_under_the_name_of_the_model(target, model_file, capsys):
     assert main([str(model_file), "--to", target]) == 0
-    output = model_file.parent / f"my box{SUFFIXES[target]}"
+    ending = "_ellipsoid" if target == "ellipsoid" else ""
+    output = model_file.parent / f"my box{ending}{SUFFIXES[target]}"
     text = output.read_text(encoding="utf-8")
     assert "my box" in text or "my_box" in text
     assert "(0, 0) m" in text

@@ -102,6 +102,23 @@ def test_lists_of_messages_may_be_given_in_yaml(box, ask):
     np.testing.assert_allclose(found["rates"], expected.rates, rtol=1e-6, atol=1e-12)
 
 
+def test_a_path_in_a_request_is_in_the_frame_of_the_request(box, ask):
+    points = ", ".join(f"{{x: {x}, y: {y}}}" for x, y in CORNERS)
+    poses = "{pose: {position: {x: -0.07}}}, {pose: {position: {x: -0.05}}}"
+    fields = f"{{outline: {{points: [{points}]}}, tip_radius: 0.01, tip_path: {{poses: [{poses}]}}"
+    for given in ((fields + ", header: {frame_id: table}}",), (fields + "}", "--frame", "table")):
+        code, answer, told = ask("simulate_push", *given)
+        assert (code, told) == (0, "")
+        assert yaml.safe_load(answer)["end"]["header"]["frame_id"] == "table"
+
+
+def test_texts_of_several_lines_are_printed_line_by_line(box, ask):
+    code, answer, _ = ask("describe_model")
+    assert code == 0
+    assert "summary: |-\n  kind: " in answer
+    assert "\n  frame: object\n" in answer
+
+
 def test_what_a_node_refuses_is_told_by_its_code(box, ask):
     code, answer, told = ask("wrench_to_twist", "--force", "0", "0")
     assert code == 1

@@ -13,8 +13,8 @@ from limit_surface_ros.errors import RangeError, shortened
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-# Numbers of an array that are shown.
-_SHOWN = 24
+# Numbers of an array that are shown: as many as a covariance has.
+_SHOWN = 36
 
 
 def type_of(name: str) -> Any:
@@ -99,6 +99,8 @@ def plain(message: Any) -> Any:
         return message
     if isinstance(message, float):
         return float(f"{message:.7g}")
+    if isinstance(message, bytes) and len(message) == 1:
+        return message[0]
     values = [plain(each) for each in message[:_SHOWN]]
     if len(message) > _SHOWN:
         values.append(f"... {len(message)} in all")

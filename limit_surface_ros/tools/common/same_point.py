@@ -48,5 +48,6 @@ def require_one_point(files: Sequence[About]) -> None:
         if other.frame_id != first.frame_id or apart > _APART:
             raise DataError(
                 f"{first}, {other}: the same wrench is another load there; "
-                "only what is about one point of one frame can be compared"
+                "only what is about one point of one frame can be compared. Write reference_point "
+                "into the contact, or into the model of pushes that were recorded about that point"
             )
