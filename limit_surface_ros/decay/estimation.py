@@ -5,7 +5,9 @@ Several families of responses near the model (`families`) are fitted to the samp
 Gauss-Newton's method from where they were, with normal priors. The evidence of each,
 chi^2 + prior + log det (information) - log det (prior information), chooses among them: Occam's
 razor of Laplace's approximation [1]. Residuals are tested against the stated noise, so that a
-response of no family is told and not believed.
+response of no family is told and not believed: nothing is stated then of what comes. Weights of
+their own follow much that is no sum of the model's exponentials, so that where nothing less
+follows the samples, bounds leave room for a polynomial beside them.
 
 At most 400 samples are kept: of more, every other one of the older half is dropped.
 
@@ -26,7 +28,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.checks import as_number, as_positive
-from limit_surface_ros.decay.families import FAMILIES, Learnt
+from limit_surface_ros.decay.families import FAMILIES, RATE_SPREAD, WEIGHT_SPREAD, Learnt
 from limit_surface_ros.errors import RangeError
 
 if TYPE_CHECKING:
@@ -49,8 +51,13 @@ MOST_DEVIATIONS, LEAST_TESTED = 4.0, 8
 # doubtful once in a hundred. What a family could follow itself is no part of them; this share of a
 # wave keeps what is left of it apart from rounding.
 SLOW_WAVES, MOST_SLOW, DOUBTFUL, LEAST_LEFT = 4, 28.5, 13.3, 0.02
+# Rates that are by more than this prior deviation off the model's are not near it.
+MOST_RATE_DEVIATION = 3.0
+# Terms of the polynomial that weights leave room for, and the latest of its time over that seen.
+POLYNOMIAL_TERMS, FAREST = 3, 1e6
 # Deviations in a bound, and the last samples that a bound is not below if nothing fits.
 BOUND_DEVIATIONS, LAST_SAMPLES = 4.0, 20
+NOISY = "the measurements are noisier than is stated"
 # Time [s] after which bounds are those of then.
 LATEST = 1e100
 # Residuals before a sample that show whether it stands alone.
@@ -112,6 +119,8 @@ class Verdict:
             way round.
         chi2_per_sample: Mean square of the residuals in units of the noise; NaN without samples.
         reason: Why nothing fits, in words; empty if something does.
+        followed: Whether a family follows them, if with more noise than is stated. Nothing is
+            known of what comes if none does.
     """
 
     fits: bool = True
@@ -122,6 +131,7 @@ class Verdict:
     reversed: bool = False
     chi2_per_sample: float = math.nan
     reason: str = ""
+    followed: bool = True
 
 
 class _Fit:
@@ -139,6 +149,8 @@ class _Fit:
         self.linked = 0.0
         self.slow = 0.0
         self.samples = 0
+        # Samples after the delay, which tell how it goes on.
+        self.after = 0
 
     def update(self, times: Floats, values: Floats, deviations: Floats, steps: int) -> None:
         """Move the numbers by so many steps of Gauss and Newton, and judge them."""
@@ -163,6 +175,7 @@ class _Fit:
             information = rows.T @ rows
             self.numbers, objective = numbers, total
             self._judge(information, errors, away, prior, rows[: len(times)])
+            self.after = int(np.count_nonzero(times > family.delay(numbers)))
             step = np.linalg.solve(information, rows.T @ np.concatenate([errors, away]))
             numbers = family.bounded(numbers + step)
             if float(np.abs(step * prior).max()) < 1e-6:
@@ -202,12 +215,19 @@ class _Fit:
         """Whether the residuals are what noise would be."""
         if self.samples < LEAST_TESTED:
             return True
-        return self.excess <= MOST_DEVIATIONS and not self.is_smooth()
+        return self.excess <= MOST_DEVIATIONS and self.is_near and not self.is_smooth()
+
+    @property
+    def is_near(self) -> bool:
+        """Whether the rates are near those of the model."""
+        return abs(math.log(self.family.rate(self.numbers))) <= MOST_RATE_DEVIATION * RATE_SPREAD
 
     @property
     def is_doubtful(self) -> bool:
-        """Whether noise would hardly make such residuals, though it might."""
-        return self.samples >= LEAST_TESTED and self.is_smooth(most=DOUBTFUL)
+        """Whether noise would hardly make such residuals, or the response has hardly begun."""
+        if self.samples < LEAST_TESTED:
+            return False
+        return self.after < LEAST_TESTED or self.is_smooth(most=DOUBTFUL)
 
     def is_smooth(self, noise: float = 1.0, most: float = MOST_SLOW) -> bool:
         """Tell whether residuals hang together as no noise of so many times the stated does."""
@@ -294,6 +314,7 @@ class ResponseEstimator:
             reversed=amplitude < -BOUND_DEVIATIONS * spread,
             chi2_per_sample=best.chi2 / max(1, best.samples),
             reason=reason,
+            followed=reason in ("", NOISY),
         )
 
     def add(self, time: float, value: float) -> bool:
@@ -344,6 +365,7 @@ class ResponseEstimator:
 
         Four standard deviations of the mixture of all families, and the distance to each that
         is credible; where nothing fits, or hardly, at least the largest of the last samples.
+        Infinite after the last sample where no family follows the samples.
         """
         # What is left later is the constant; products with later times would overflow.
         times = np.minimum(times, LATEST)
@@ -365,7 +387,45 @@ class ResponseEstimator:
         if self._reason(self._best) or self._best.is_doubtful:
             last = float(np.abs(self._values[-LAST_SAMPLES:]).max())
             bounds = np.maximum(bounds, last + BOUND_DEVIATIONS * self._options.noise)
+        if self._best.family.name == "weights" and len(self._times):
+            bounds = np.maximum(bounds, self._room(times))
+        if not self.verdict.followed:
+            off = float(np.abs(self._values - self.learnt(self._times)).max())
+            bounds = np.maximum(bounds, off + BOUND_DEVIATIONS * self._options.noise)
+            bounds = np.where(times <= self.seen, bounds, math.inf)
         return bounds
+
+    def _room(self, times: Floats) -> Floats:
+        """Return the bound that a polynomial beside the chosen family asks for, shape (n,)."""
+        best, mine = self._best, self._best.family
+        fitted, slopes = mine.values(self._times, best.numbers)
+        deviations = self._deviations()
+        size = WEIGHT_SPREAD * float(np.abs(self._values).max() + self._options.noise)
+        spreads = np.append(mine.spread, np.full(POLYNOMIAL_TERMS, size))
+        rows = np.hstack([slopes, self._polynomial(self._times)]) * spreads
+        errors = (self._values - fitted) / deviations
+        rows /= deviations[:, np.newaxis]
+        away = np.append((mine.mean - best.numbers) / mine.spread, np.zeros(POLYNOMIAL_TERMS))
+        information = rows.T @ rows + np.eye(len(spreads))
+        root = np.linalg.cholesky(information)
+        move = np.linalg.solve(information, rows.T @ errors + away)
+        _, later = mine.values(times, best.numbers)
+        ahead = np.hstack([later, self._polynomial(times)]) * spreads
+        spread = np.linalg.norm(np.linalg.solve(root, ahead.T), axis=0)
+        room: Floats = np.abs(ahead @ move) + BOUND_DEVIATIONS * spread
+        return room
+
+    def _polynomial(self, times: Floats) -> Floats:
+        """Return Legendre's polynomials over the time that was seen, shape (n, terms)."""
+        first = float(self._times[0])
+        span = max(self.seen - first, 1e-300)
+        scaled = np.minimum((times - first) / span, FAREST)
+        basis = np.polynomial.legendre.legvander(2.0 * scaled - 1.0, POLYNOMIAL_TERMS - 1)
+        return np.asarray(basis, dtype=np.float64)
+
+    def _deviations(self) -> Floats:
+        deviations: Floats = self._options.noise * self._options.forgetting ** (-0.5 * self._ages)
+        return deviations
 
     def _reason(self, best: _Fit) -> str:
         if self._changed:
@@ -373,9 +433,9 @@ class ResponseEstimator:
         if best.passes:
             return ""
         # Larger noise alone leaves residuals as independent as before.
-        if best.is_smooth(max(1.0, math.sqrt(best.chi2 / best.samples))):
+        if not best.is_near or best.is_smooth(max(1.0, math.sqrt(best.chi2 / best.samples))):
             return "no family of responses near the model follows the measurements"
-        return "the measurements are noisier than is stated"
+        return NOISY
 
     def _spread(self, fit: _Fit) -> float:
         """Return the standard deviation of the first number."""
@@ -412,7 +472,7 @@ class ResponseEstimator:
 
     def _fit(self) -> None:
         count = len(self._times)
-        deviations = self._options.noise * self._options.forgetting ** (-0.5 * self._ages)
+        deviations = self._deviations()
         self._learnt = None
         if count > FIRST and self.accepted % EVERY:
             self._best.update(self._times, self._values, deviations, STEPS - 1)

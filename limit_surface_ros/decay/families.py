@@ -96,6 +96,10 @@ class Family:
         """Return the factor s on the model's rates."""
         return 1.0
 
+    def delay(self, numbers: Floats) -> float:
+        """Return the delay d [s]."""
+        return 0.0
+
     def spread_at(self, times: Floats, numbers: Floats, root: Floats) -> Floats:
         """Return the standard deviation of the response at times, shape (n,).
 
@@ -149,6 +153,10 @@ class DelayFamily(RateFamily):
     """A m(s (t - d)), and A m(0) before d; numbers A, log s and d."""
 
     name = "delay"
+
+    def delay(self, numbers: Floats) -> float:
+        """Return the delay d [s]."""
+        return float(numbers[2])
 
     def _prior(self, model: ExponentialSum) -> tuple[Floats, Floats]:
         fastest = float(np.abs(model.rates).max()) or 1.0

@@ -116,6 +116,8 @@ class Response:
         verdict = self.verdict
         if not self.samples or (verdict.fits and verdict.family == "amplitude"):
             return math.inf
+        if not verdict.followed:
+            return self._estimator.seen
         return self._options.span_factor * self._estimator.seen
 
     def fractions(self, times: ArrayLike) -> Floats:
@@ -128,8 +130,8 @@ class Response:
 
         What is stated of the model, and after corrections four standard deviations of the
         estimate, and the distance to other families that measurements do not rule out. Infinite
-        where nothing is known: where nothing is stated, and where the model itself does not fit,
-        after `span_factor` times the time that was seen.
+        where nothing is known: where nothing is stated; where the model itself does not fit, after
+        `span_factor` times the time that was seen; and where no family follows, after that time.
 
         Args:
             times: Shape (n,) [s], each >= 0.

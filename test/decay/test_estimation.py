@@ -111,6 +111,42 @@ def test_a_straight_line_is_told_from_an_exponential_before_it_ends(seed):
     assert share_of_bound(seen(ONE, line, seed), line) <= 1.0
 
 
+@pytest.mark.parametrize("model", [TWO, KINKED], ids=["two terms", "kinked"])
+def test_a_line_that_weights_of_their_own_follow_stays_within_its_bound(model):
+    for seed in range(200, 210):
+        estimator = seen(model, lambda t: model.start * (1.0 - np.asarray(t) / 2.5), seed)
+        times = np.linspace(0.0, 3.0, 121)
+        errors = np.abs(estimator.learnt(times) - model.start * (1.0 - times / 2.5))
+        assert (errors <= estimator.bounds(times)).all()
+
+
+@pytest.mark.parametrize("model", [ONE, TWO], ids=["one term", "two terms"])
+def test_of_a_response_that_no_family_follows_nothing_is_stated_after_the_last_sample(model):
+    for seed in range(210, 215):
+        estimator = seen(model, lambda t: np.exp(0.3 * np.asarray(t)), seed)
+        assert not estimator.verdict.followed
+        is_seen = estimator.seen >= HORIZON
+        before, after = HORIZON[is_seen], HORIZON[~is_seen]
+        assert np.isinf(estimator.bounds(after)).all()
+        errors = np.abs(estimator.learnt(before) - np.exp(0.3 * before))
+        assert (errors <= estimator.bounds(before)).all()
+
+
+def test_a_response_that_has_not_begun_to_fall_may_stay_as_large_as_it_is():
+    for seed in range(215, 220):
+        estimator = seen(ONE, lambda t: np.ones_like(t), seed)
+        times = np.linspace(0.0, 3.0, 121)
+        assert (np.abs(estimator.learnt(times) - 1.0) <= estimator.bounds(times)).all()
+
+
+def test_weights_of_their_own_still_state_a_bound_that_is_of_use():
+    other = ExponentialSum([-0.5, -3.0], [0.3, 0.7])
+    for seed in range(4):
+        estimator = seen(TWO, other, seed)
+        times = np.linspace(0.0, 1.3, 50)
+        assert (estimator.bounds(times) < 0.2).all()
+
+
 def test_what_the_model_itself_may_be_off_is_no_misfit():
     options = EstimationOptions(noise=0.02, model_error=0.02)
     wavy = seen(TWO, lambda t: TWO(t) + 0.02 * np.sin(7.0 * np.asarray(t)), options=options)
