@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import secrets
 from pathlib import Path
@@ -40,7 +41,9 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
         raise _unwritable(path, error) from None
     finally:
         if part is not None:
-            part.unlink(missing_ok=True)
+            # A file system that has become read-only refuses even where there is nothing.
+            with contextlib.suppress(OSError):
+                part.unlink()
 
 
 def check_writable(path: str | Path) -> Path:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import errno
 import multiprocessing
 import os
 import signal
@@ -264,6 +265,48 @@ def test_a_node_ends_whose_learning_process_does_not_answer(ros, client_node, pr
     ros.wait(lambda: node.describe()["pushes that wait"] == "1")
     node.learner.close()
     ros.wait(lambda: not process.is_alive())
+
+
+def test_what_is_learnt_can_be_saved_later_where_its_folder_was_read_only_or_gone(
+    ros, client_node, prior, tmp_path, monkeypatch
+):
+    folder = tmp_path / "kept"
+    folder.mkdir()
+    saved = folder / "learnt.yaml"
+    parameters = {"learn": True, "learn_file": str(saved)}
+    node = ros.add(LimitSurfaceNode, files=[prior], parameters=parameters)
+    save = ros.client(client_node, Trigger, "/limit_surface/save_learnt")
+    Robot(ros, client_node).push(node, BODY, 1, 1)
+    folder.rmdir()
+    gone = save(Trigger.Request())
+    assert not gone.success
+    assert "No such file or directory; nothing was written" in gone.message
+
+    def refused(*_, **__):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    # A read-only file system refuses to take away even what is not there.
+    with monkeypatch.context() as patched:
+        patched.setattr("pathlib.Path.open", refused)
+        patched.setattr("pathlib.Path.unlink", refused)
+        fixed = save(Trigger.Request())
+    assert not fixed.success
+    assert "Read-only file system; nothing was written" in fixed.message
+    assert node.health.refused["save_learnt", "BAD_FILE"] == 2
+    folder.mkdir()
+    assert save(Trigger.Request()).success
+    assert [path.name for path in folder.iterdir()] == ["learnt.yaml"]
+    assert len(read_surface_model(saved).fit["online"]["pushes"]) == 1
+
+
+def test_learning_goes_on_when_the_clock_is_set_back(ros, client_node, prior):
+    node = ros.add(LimitSurfaceNode, files=[prior], parameters={"learn": True})
+    robot = Robot(ros, client_node)
+    robot.time = 100.0
+    robot.push(node, BODY, 1, 1)
+    robot.time = 90.0
+    robot.push(node, BODY, 1, 2)
+    assert not node.health.refused
 
 
 def test_what_is_going_to_be_learnt_can_be_the_default_from_the_start(ros, prior):
