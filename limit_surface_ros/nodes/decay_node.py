@@ -12,7 +12,7 @@ from limit_surface_interfaces.msg import DecayForecast, NormalForce, TimeLeft
 from limit_surface_interfaces.srv import DescribeModel, ListDecays
 
 from limit_surface_ros.decay.estimation import EstimationOptions
-from limit_surface_ros.errors import RangeError
+from limit_surface_ros.errors import RangeError, UnavailableError
 from limit_surface_ros.files.decay_file import DecayModel, read_decay_model
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.nodes.decay import running_decay, sliding_services
@@ -197,6 +197,12 @@ class DecayNode(ModelNode[DecayModel]):
         return lines
 
     def _begin(self, message: WrenchStamped) -> None:
+        if not nanoseconds(message.header.stamp) and not self._now():
+            # As of time 0 it would be over when the clock comes.
+            raise UnavailableError(
+                "an onset without a stamp is of the present, which is not known yet: "
+                "with use_sim_time, node time is 0 until /clock comes"
+            )
         options = EstimationOptions(
             noise=self.values["measurement_noise"],
             forgetting=self.values["forgetting"],

@@ -139,6 +139,21 @@ def test_an_onset_without_a_stamp_is_now(ros, bench):
     assert time_of(bench.forecasts[0]) == START
 
 
+def test_an_onset_without_a_stamp_is_refused_while_the_clock_has_not_come(
+    ros, client_node, tmp_path
+):
+    bench = Bench(ros, client_node, tmp_path, rate=100.0)
+    bench.onset(0)
+    assert bench.refused["onset", "UNAVAILABLE"] == 1
+    assert "until /clock comes" in bench.node.health.last_error
+    # With a stamp it is waited for, and the clock's first tick begins it.
+    bench.onset(START)
+    bench.tick(START)
+    bench.tick(START + STEP)
+    ros.wait(lambda: len(bench.values) == 2)
+    assert stamps(bench.wrenches) == [START, START + STEP]
+
+
 @pytest.mark.parametrize(
     ("load", "code"),
     [

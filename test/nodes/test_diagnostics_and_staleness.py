@@ -146,6 +146,8 @@ def test_staleness_counts_in_simulated_time_also_when_it_jumps_back(ros, client_
         seen.wait(lambda: len(seen.arrays) > count + 1)
         return seen.status.level
 
+    assert fresh_status() == DiagnosticStatus.WARN
+    assert "/clock has not come yet" in seen.status.message
     set_time(1000)
     seen.loads.publish(wrench_message([9, 0, 0]))
     ros.wait(lambda: len(seen.twists) == 1)

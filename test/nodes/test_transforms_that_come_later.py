@@ -18,6 +18,7 @@ from geometry_msgs.msg import TransformStamped, TwistStamped, WrenchStamped
 from limit_surface_interfaces.msg import ErrorCode
 from limit_surface_interfaces.srv import WrenchesToTwists, WrenchToTwist
 from rclpy.parameter import Parameter
+from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 from transform_helpers import Buffer
 
@@ -251,6 +252,32 @@ def test_of_a_transform_that_cannot_be_used_the_message_names_the_transform(
     answer = bench.ask(11 * SECOND)
     assert bench.ros.done(answer, WAIT)
     twist = planar_twist(answer.result().twist)
+    np.testing.assert_allclose(twist, bench.expected(0.1), rtol=1e-9)
+
+
+def test_what_waits_is_refused_when_the_clock_jumps_back(ros, client_node, moving):
+    bench = moving(use_sim_time=True, **PATIENT)
+    clock = client_node.create_publisher(Clock, "/clock", 1)
+    ros.matched(clock)
+
+    def tick(time):
+        clock.publish(Clock(clock=stamp_of(time)))
+        ros.wait(lambda: bench.node.get_clock().now().nanoseconds == time)
+
+    tick(100 * SECOND)
+    bench.come(100 * SECOND, 0.1)
+    bench.publish(101 * SECOND)
+    waiting = bench.ask(101 * SECOND)
+    ros.wait(lambda: bench.node.input.frames.waiting == 2)
+    tick(90 * SECOND)
+    assert ros.done(waiting, WAIT)
+    assert waiting.result().error_code == ErrorCode.TRANSFORM_TOO_NEW
+    ros.wait(lambda: bench.node.health.refused["wrench", "TRANSFORM_TOO_NEW"] == 1)
+    assert not bench.node.input.frames.waiting
+    # Without a stamp it is the newest transform.
+    latest = bench.ask(0)
+    assert ros.done(latest, WAIT)
+    twist = planar_twist(latest.result().twist)
     np.testing.assert_allclose(twist, bench.expected(0.1), rtol=1e-9)
 
 

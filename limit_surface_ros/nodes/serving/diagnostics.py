@@ -231,6 +231,8 @@ class Diagnostics:
             messages.append(self._mismatches[0].sentence)
         if self._duplicates:
             messages.append(self._duplicate_message)
+        if not now:
+            messages.append("node time is 0: use_sim_time is true, and /clock has not come yet")
         level = DiagnosticStatus.WARN if messages else DiagnosticStatus.OK
         if stale:
             level = DiagnosticStatus.STALE
