@@ -25,7 +25,12 @@ from limit_surface_ros.decay.grids import fit_times, is_steep
 from limit_surface_ros.decay.least_squares import least_squares_fit, require_samples
 from limit_surface_ros.decay.neutral import neutral_rates
 from limit_surface_ros.decay.noise import LEAST_SAMPLES, is_noisy, noise_level
-from limit_surface_ros.decay.outliers import holds_strays, running_median
+from limit_surface_ros.decay.outliers import (
+    holds_strays,
+    resting_median,
+    running_median,
+    stray_start,
+)
 from limit_surface_ros.decay.polish import LEAST_DECAYS, polished_rates
 from limit_surface_ros.decay.rates import RateChoice
 from limit_surface_ros.decay.steep import steep_rates
@@ -50,6 +55,8 @@ MOST_BEHIND = 2.0
 GROWN, GROWTH_POINTS = 1.2, 501
 # Without noise `auto` takes the fewest terms whose error is below this part of the onset.
 AUTO_ERROR, MOST_AUTO = 1e-3, 15
+# It seeks no further when as many more terms lowered the error to no less than this part.
+AUTO_PATIENCE, AUTO_GAIN = 4, 0.9
 
 
 @dataclass(frozen=True)
@@ -169,7 +176,9 @@ def fit_decay(
     start = time.perf_counter()
     noise = noise_level(response)
     strays = (
-        chosen.robust and isinstance(response, Record) and holds_strays(response.values, noise)
+        chosen.robust
+        and isinstance(response, Record)
+        and _holds_strays(response, noise, chosen.offset)
     )
     by_samples = method == "least_squares" or (
         method == "best" and (chosen.offset or strays or is_noisy(response))
@@ -213,6 +222,13 @@ def fit_decay(
     return DecayFit(choice, fit, time.perf_counter() - start, largest, tail, noise)
 
 
+def _holds_strays(record: Record, noise: float, offset: bool) -> bool:
+    """Tell whether samples stand out, at the start of a record too."""
+    level = resting_median(record.values) if offset else 0.0
+    starts = stray_start(record.knots, record.values - level, noise)
+    return bool(starts.any()) or holds_strays(record.values, noise)
+
+
 def refuse_growth(response: Target, end: float) -> None:
     """Refuse a response that is largest at the end of the interval, and larger than its onset.
 
@@ -245,9 +261,10 @@ def _fewest(
     envelope: float | None,
     tell: Progress,
 ) -> tuple[RateChoice, ResponseFit]:
-    """Fit with more and more terms until the error is small; keep the last if it never is."""
+    """Fit with more and more terms until the error is small, or more no longer lower it."""
     failure: LimitSurfaceError | None = None
     best: tuple[RateChoice, ResponseFit] | None = None
+    least: list[float] = []
     for terms in range(1, MOST_AUTO + 1):
         if isinstance(response, PiecewiseLinear) and len(response.knots) < 2 * terms:
             break
@@ -259,6 +276,9 @@ def _fewest(
         if best is None or found[1].max_error < best[1].max_error:
             best = found
         if found[1].max_error <= AUTO_ERROR * abs(float(response(0.0))):
+            break
+        least.append(best[1].max_error)
+        if len(least) > AUTO_PATIENCE and least[-1] > AUTO_GAIN * least[-1 - AUTO_PATIENCE]:
             break
     if best is None:
         raise failure or SolverError("the response has too few samples for one term")

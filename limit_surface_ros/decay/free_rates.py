@@ -24,7 +24,12 @@ from scipy import fft, linalg
 
 from limit_surface_ros.decay.basis import as_rates, count_terms, real_basis
 from limit_surface_ros.decay.esprit import rates_of_subspace, signal_subspace
-from limit_surface_ros.decay.outliers import neighbour_weights, stand_out
+from limit_surface_ros.decay.outliers import (
+    neighbour_weights,
+    resting_median,
+    stand_out,
+    stray_start,
+)
 from limit_surface_ros.decay.rates import take
 from limit_surface_ros.decay.varpro import FreeFit, Projection, Samples, VariableProjection
 from limit_surface_ros.errors import SolverError
@@ -105,6 +110,11 @@ def free_rates(
     Raises:
         SolverError: No number of terms could be fitted.
     """
+    if robust:
+        # Weights of residuals do not tell them from a steep start.
+        level = resting_median(samples.values) if samples.offset else 0.0
+        strays = stray_start(samples.times, samples.values - level, samples.noise)
+        samples = replace(samples, weights=np.where(strays, 0.0, samples.weights))
     weights = samples.weights.copy()
     if robust:
         weights[stand_out(samples.values, samples.noise)] = 0.0
@@ -166,7 +176,7 @@ class _Path:
         self._step = float(np.median(np.diff(times)))
         self._dictionary = -np.geomspace(0.4 / samples.end, 1.5 / self._step, DICTIONARY)
         # Without a constant, which ESPRIT would take for a slow rate.
-        level = float(np.median(values[-max(1, len(values) // 10) :])) if samples.offset else 0.0
+        level = resting_median(values) if samples.offset else 0.0
         self._subspaces = [
             subspace
             for part in WINDOWS

@@ -97,21 +97,24 @@ def least_squares_fit(
     assumed = _creep(values, least) if offset else max(envelope_of(record, end, noise), least)
     samples = Samples(times, values, np.ones(len(times)), least, assumed, offset)
     found = free_rates(samples, terms, robust, tell)
-    kept = ~found.outliers
     rates, weights = found.fit.rates, found.fit.weights
     if offset:
         rates, weights = np.append(0.0j, rates), np.append(found.fit.constant, weights)
-    good = Record(times[kept], values[kept]) if kept[0] else record
     x = ExponentialSum.from_weights(rates, weights)
+    # A record begins at 0: where that sample counts for nothing, the sum stands in for it.
+    kept = ~found.outliers
+    starts = values if kept[0] else np.append(x(0.0), values[1:])
+    kept[0] = True
+    good = Record(times[kept], starts[kept])
     envelope = envelope_of(good, end, noise, x.constant)
     error = largest_error(x, good, 0.0, end)
     value = float(np.linalg.norm(found.weights * found.fit.residuals))
     fit = ResponseFit(x, "2", end, error, value, float("nan"))
     if norm not in ("auto", "2"):
         fit = replace(fit_response(rates, good, end, norm, envelope), end=end)
-    parameters = {"noise": noise, "outliers": int(np.count_nonzero(~kept))}
+    parameters = {"noise": noise, "outliers": int(np.count_nonzero(found.outliers))}
     choice = RateChoice(rates, METHOD, error, None, parameters)
-    return LeastSquaresFit(choice, fit, envelope, times[~kept], found.tried)
+    return LeastSquaresFit(choice, fit, envelope, times[found.outliers], found.tried)
 
 
 def _creep(values: Floats, noise: float) -> float:

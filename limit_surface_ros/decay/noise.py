@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limit_surface_ros.decay.outliers import onset_size
 from limit_surface_ros.decay.targets import PiecewiseLinear, Record
 from limit_surface_ros.sample_noise import estimate_noise
 
@@ -40,7 +41,10 @@ def noise_level(response: Target) -> float:
 
 def is_noisy(response: Target) -> bool:
     """Tell whether a record's noise is more than its kernel or a polished fit could stand."""
-    return noise_level(response) > TOLERATED * abs(float(response(0.0)))
+    noise = noise_level(response)
+    if not noise or not isinstance(response, PiecewiseLinear):
+        return False
+    return noise > TOLERATED * onset_size(response.knots, response.values, noise)
 
 
 def settling_time(response: Target, end: float) -> float:
@@ -69,11 +73,8 @@ def resting_level(record: Record, end: float) -> float | None:
         abs(float(before.mean()) - level) <= SAME_LEVEL * abs(level) + 3.0 * mean_noise
         and float(np.ptp(last)) <= spread
     )
-    fell = (
-        max(LEAST_LEVEL * abs(float(values[0])), 5.0 * mean_noise)
-        < abs(level)
-        < 0.9 * abs(float(values[0]))
-    )
+    onset = onset_size(record.knots[: len(values)], values, noise)
+    fell = max(LEAST_LEVEL * onset, 5.0 * mean_noise) < abs(level) < 0.9 * onset
     return level if stays and fell else None
 
 

@@ -74,8 +74,11 @@ def between(result: DecayFit, given: DecayInput) -> float | None:
     if not isinstance(given.target, Record):
         return None
     times = given.target.knots
-    kept = ~np.isin(times, result.outliers)
-    lines = PiecewiseLinear(times[kept], given.target.values[kept])
+    kept, values = ~np.isin(times, result.outliers), given.target.values
+    if not kept[0]:
+        # Before the first sample that counts, the sum begins at its own value.
+        kept[0], values = True, np.append(result.fit.sum(0.0), values[1:])
+    lines = PiecewiseLinear(times[kept], values[kept])
     return largest_error(result.fit.sum, lines, 0.0, given.end)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from limit_surface_ros.checks import counted
 from limit_surface_ros.decay.noise import resting_level
+from limit_surface_ros.decay.outliers import onset_size, starts_alone
 from limit_surface_ros.decay.targets import Record
 from limit_surface_ros.tools.common.decay_fit import between, beyond
 
@@ -100,10 +101,22 @@ def tried_in_words(result: DecayFit) -> str:
     )
 
 
+def _onset_is_doubtful(result: DecayFit, given: DecayInput) -> bool:
+    """Tell whether the first sample alone makes the onset that was fitted."""
+    record = given.target
+    if not isinstance(record, Record) or 0.0 in result.outliers:
+        return False
+    kept = ~np.isin(record.knots, result.outliers)
+    values = record.values[kept] - result.fit.sum.constant
+    return starts_alone(record.knots[kept], values, result.noise)
+
+
 def doubts(result: DecayFit, given: DecayInput) -> list[str]:
     """Return why the fit may be no model of a decaying response, in one line each."""
     fit, found = result.fit, []
     onset = abs(float(given.target(0.0)))
+    if isinstance(given.target, Record):
+        onset = onset_size(given.target.knots, given.target.values, result.noise)
     left = abs(float(fit.sum(given.end))) / abs(float(fit.sum(0.0)) or onset)
     if left > _MOST_LEFT:
         found.append(
@@ -113,6 +126,12 @@ def doubts(result: DecayFit, given: DecayInput) -> list[str]:
         found.append(
             f"the error is {fit.max_error / onset:.3g} times the onset: "
             "too few terms, or no decaying response"
+        )
+    if _onset_is_doubtful(result, given):
+        found.append(
+            f"the first sample, {float(given.target(0.0)):.4g}, is kept, but no other bears it "
+            "out: a stray one, or a term that is gone with the second? If it is stray, "
+            "begin after it with --start"
         )
     level = None
     if isinstance(given.target, Record):
