@@ -67,7 +67,7 @@ def test_without_a_prior_it_begins_with_a_sphere_and_draws(pushes, tmp_path, cap
     [
         (["--forgetting", "much"], "--forgetting must be a number or blend, got 'much'"),
         (["--forgetting", "2"], "forgetting must be above 0 and at most 1"),
-        (["--keep", "1"], "window must be at least 2 pushes"),
+        (["--keep", "1"], "window must be at least 2, got 1"),
         (["--wrench-topic", "/w"], "--wrench-topic does nothing here"),
         (["-o", "model.txt"], "model.txt"),
         (["--prior", "absent.yaml"], "absent.yaml"),
