@@ -57,8 +57,9 @@ _ADDRESSED = (
 # What names the folder of the log, for rcl.
 _HOMES = ("ROS_LOG_DIR", "ROS_HOME", "HOME")
 # Requests may be on their way: so long after the last one [s], and no longer in all, a node that
-# ends refuses what comes, and one of those that wait at a time.
-QUIET, LONGEST_END, PACE = 0.2, 5.0, 0.02
+# ends refuses what comes, and one of those that wait at a time. On a busy machine the time may
+# pass before it has looked so many times.
+QUIET, LONGEST_END, PACE, QUIET_TURNS = 0.2, 5.0, 0.02, 10
 # What has begun is finished, unless it takes so long [s] or a second signal comes; then it is
 # refused.
 LONGEST_ANSWER = 60.0
@@ -186,6 +187,7 @@ def _answer_what_waits(
     woken.setblocking(False)
     start = refused = time.monotonic()
     cut = False
+    turns, latest = 0, start
     while True:
         now = time.monotonic()
         if now - refused > PACE:
@@ -194,7 +196,9 @@ def _answer_what_waits(
                 each.refuse_next()
         under_way = any(each.under_way for each in endpoints)
         last = max(start, *(each.last_request for each in endpoints))
-        if not under_way and (now - last > QUIET or now - start > LONGEST_END):
+        turns, latest = (0 if under_way or last > latest else turns + 1), last
+        quiet = now - last > QUIET and turns > QUIET_TURNS
+        if not under_way and (quiet or now - start > LONGEST_END):
             break
         if not cut and (now - start > LONGEST_ANSWER or _again(woken)):
             cut, start = True, now
