@@ -54,7 +54,7 @@ SLOW_WAVES, MOST_SLOW, DOUBTFUL, LEAST_LEFT = 4, 28.5, 13.3, 0.02
 # Rates that are by more than this prior deviation off the model's are not near it.
 MOST_RATE_DEVIATION = 3.0
 # Terms of the polynomial that weights leave room for, and the latest of its time over that seen.
-POLYNOMIAL_TERMS, FAREST = 3, 1e6
+POLYNOMIAL_TERMS, FARTHEST = 3, 1e6
 # Deviations in a bound, and the last samples that a bound is not below if nothing fits.
 BOUND_DEVIATIONS, LAST_SAMPLES = 4.0, 20
 NOISY = "the measurements are noisier than is stated"
@@ -157,18 +157,19 @@ class _Fit:
         family = self.family
         prior = 1.0 / family.spread
         numbers, objective = self.numbers, math.inf
-        for _ in range(steps + 1):
+
+        def residuals(numbers: Floats) -> tuple[Floats, Floats, Floats, float]:
+            """Return errors, how far the numbers are from their means, slopes and objective."""
             fitted, slopes = family.values(times, numbers)
-            errors = (values - fitted) / deviations
-            away = (family.mean - numbers) * prior
-            total = float(errors @ errors + away @ away)
+            errors, away = (values - fitted) / deviations, (family.mean - numbers) * prior
+            return errors, away, slopes, float(errors @ errors + away @ away)
+
+        for _ in range(steps + 1):
+            errors, away, slopes, total = residuals(numbers)
             if not total <= objective:
                 # Half the way back, once; the next sample brings another step.
                 numbers = family.bounded(0.5 * (numbers + self.numbers))
-                fitted, slopes = family.values(times, numbers)
-                errors = (values - fitted) / deviations
-                away = (family.mean - numbers) * prior
-                total = float(errors @ errors + away @ away)
+                errors, away, slopes, total = residuals(numbers)
                 if not total <= objective:
                     break
             rows = np.concatenate([slopes / deviations[:, np.newaxis], np.diag(prior)])
@@ -419,7 +420,7 @@ class ResponseEstimator:
         """Return Legendre's polynomials over the time that was seen, shape (n, terms)."""
         first = float(self._times[0])
         span = max(self.seen - first, 1e-300)
-        scaled = np.minimum((times - first) / span, FAREST)
+        scaled = np.minimum((times - first) / span, FARTHEST)
         basis = np.polynomial.legendre.legvander(2.0 * scaled - 1.0, POLYNOMIAL_TERMS - 1)
         return np.asarray(basis, dtype=np.float64)
 
