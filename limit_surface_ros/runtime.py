@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+# Number of the last of the standard streams: stdin, stdout, stderr.
 _LAST_STANDARD = 2
 # Exit code of a program that was interrupted: that of a shell for SIGINT.
 INTERRUPTED = 130

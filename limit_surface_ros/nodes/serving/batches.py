@@ -33,8 +33,10 @@ FIRST_PUSHES = 64
 # Taking so many rows from the middleware, and giving the answer to it, takes a millisecond each:
 # others have a turn after the one and before the other.
 LARGE_ROWS = 100_000
-# Bytes of the requests that wait for their turn; what more come are refused.
+# Bytes of the requests that wait for their turn; what more come are refused. A row is a vector,
+# that of a push a pose and both ends of its path.
 MOST_BYTES = 2**28
+_ROW_BYTES, _PUSH_BYTES = 3 * 8, (3 + 4) * 8
 
 
 class Batches:
@@ -71,7 +73,7 @@ class Batches:
         if rows <= FIRST_ROWS:
             work(slice(0, rows))
             return
-        await self._wait_for_turn(24 * rows)
+        await self._wait_for_turn(_ROW_BYTES * rows)
         try:
             if rows > LARGE_ROWS:
                 await self._endpoints.give_way()
@@ -107,7 +109,7 @@ class Batches:
         """
         if rows <= FIRST_PUSHES:
             return await in_turns(self._endpoints, stages)
-        await self._wait_for_turn(56 * rows)
+        await self._wait_for_turn(_PUSH_BYTES * rows)
         try:
             return await in_turns(self._endpoints, stages)
         finally:
