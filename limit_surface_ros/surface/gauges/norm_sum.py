@@ -216,12 +216,7 @@ class PointNormSum:
             gradient += self._unit_loads[:, :, part].reshape(3, -1) @ velocities.reshape(
                 -1, columns
             )
-            # A speed's Hessian is [ey^2, -ex ey; -ex ey, ex^2] / speed if nothing is smoothed.
-            weights = np.empty((3, *ex.shape))
-            np.multiply(ey, ey, out=weights[0])
-            np.multiply(ex, ex, out=weights[1])
-            np.multiply(ex, ey, out=weights[2])
-            weights *= slowness
+            weights = _turning_weights(ex, ey, slowness)
             if softness is not None:
                 weights[:2] += slowness**3 * softness
             hessian += self._turns[:, :, part].reshape(6, -1) @ weights.reshape(-1, columns)
@@ -246,11 +241,7 @@ class PointNormSum:
             gradient += self._unit_loads[:, :, part].reshape(3, -1) @ velocities.reshape(
                 -1, columns
             )
-            weights = np.empty((3, *ex.shape))
-            np.multiply(ey, ey, out=weights[0])
-            np.multiply(ex, ex, out=weights[1])
-            np.multiply(ex, ey, out=weights[2])
-            weights *= slowness
+            weights = _turning_weights(ex, ey, slowness)
             hessian += self._turns[:, :, part].reshape(6, -1) @ weights.reshape(-1, columns)
         return Turning(np.einsum("im,im->m", gradient, twists), gradient, hessian, kinks)
 
@@ -305,3 +296,17 @@ class PointNormSum:
         if speed.min(initial=np.inf) <= (least * size.max(initial=0.0)) ** 2:
             speed[speed <= np.square(least * size.max(axis=0))] = np.inf
         return np.sqrt(speed, out=speed)
+
+
+def _turning_weights(ex: Floats, ey: Floats, slowness: Floats) -> Floats:
+    """Return ey^2, ex^2 and ex ey times the slowness, shape (3, ...).
+
+    A speed's Hessian by its velocity is [ey^2, -ex ey; -ex ey, ex^2] / speed, (ex, ey) of unit
+    length, if nothing is smoothed.
+    """
+    weights = np.empty((3, *ex.shape))
+    np.multiply(ey, ey, out=weights[0])
+    np.multiply(ex, ex, out=weights[1])
+    np.multiply(ex, ey, out=weights[2])
+    weights *= slowness
+    return weights

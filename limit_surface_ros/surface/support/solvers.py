@@ -10,7 +10,7 @@ table of starts are climbed.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -65,6 +65,15 @@ class StartedSolver(SupportSolver):
         """Return points (s, 3) of which the best leads to the answer for one normal (3,)."""
 
 
+class _Starts(NamedTuple):
+    """Points (3, m) to start from, with the gauge's values (m,) and derivatives there."""
+
+    values: Floats
+    points: Floats
+    gradients: Floats
+    hessians: Floats
+
+
 class ConvexNewton(StartedSolver):
     """Support points of g(x) = 1 for a convex gauge g, by Newton's method."""
 
@@ -91,56 +100,53 @@ class ConvexNewton(StartedSolver):
         """Return what `solve` does, with other corners: those that may be near to the answers."""
         units = of_unit_length(normals)
         if corners is None:
-            starts = np.ones(units.shape[1]), *self.starts(units)
-            points = self._descend(units, starts)
+            starts = _Starts(np.ones(units.shape[1]), *self.starts(units))
+            points = self._descended(units, starts)
         else:
             distance, points = corners.nearest(units)
             smooth = np.flatnonzero(distance > 1.0)
             if len(smooth):
                 some, near = units.take(smooth, axis=1), points.take(smooth, axis=1)
                 starts = self._starts_beside(some, near, distance[smooth])
-                points[:, smooth] = self._descend(some, starts)
+                points[:, smooth] = self._descended(some, starts)
         points /= self._gauge.values(points)
         return points, (normals * points).sum(axis=0)
 
-    def _descend(self, units: Floats, starts: tuple[Floats, Floats, Floats, Floats]) -> Floats:
-        """Return the support points for unit vectors (3, m), from values, points and so on."""
+    def _descended(self, units: Floats, starts: _Starts) -> Floats:
+        """Return the support points (3, m) for unit vectors (3, m)."""
         values, points, gradients, hessians = starts
         return certain_minimum(self._gauge, units, points, (values, gradients, hessians))
 
-    def _starts_beside(
-        self, units: Floats, near: Floats, distance: Floats
-    ) -> tuple[Floats, Floats, Floats, Floats]:
-        """Return values, points (3, m), gradients and Hessians (3, 3, m) of the better starts.
+    def _starts_beside(self, units: Floats, near: Floats, distance: Floats) -> _Starts:
+        """Return the better starts, the points by the corners or those of the table.
 
         Args:
             units: Unit vectors (3, m).
             near: Points (3, m) by the corners nearest to them.
             distance: From the cones of these, in their radii, (m,).
         """
+        count = len(distance)
         points = near / self._gauge.values(near)
+        found = _Starts(np.ones(count), points, np.empty((3, count)), np.empty((3, 3, count)))
+        beside = np.ones(count, dtype=bool)
         far = np.flatnonzero(distance > _CLOSE)
-        if len(far) == 0:
-            values, gradients, hessians = self._gauge.derivatives(points, np.zeros(len(distance)))
-            return values, points, gradients, hessians
-        wanted, others = units.take(far, axis=1), self.starts(units.take(far, axis=1))
-        better = np.einsum("im,im->m", wanted, points.take(far, axis=1)) > np.einsum(
-            "im,im->m", wanted, others[0]
-        )
-        left = np.flatnonzero(~(better & (distance[far] < _BESIDE)))
-        place = far[left]
-        beside = np.ones(len(distance), dtype=bool)
-        beside[place] = False
-        values = np.ones(len(distance))
-        gradients, hessians = np.empty_like(points), np.empty((3, 3, len(distance)))
+        if len(far):
+            wanted = units.take(far, axis=1)
+            table = self.starts(wanted)
+            by_corner, by_table = (
+                np.einsum("im,im->m", wanted, each)
+                for each in (points.take(far, axis=1), table[0])
+            )
+            beside[far] = (by_corner > by_table) & (distance[far] < _BESIDE)
+            others = np.flatnonzero(~beside[far])
+            for array, rows in zip(found[1:], table, strict=True):
+                array[..., far[others]] = rows.take(others, axis=-1)
         at = np.flatnonzero(beside)
         if len(at):
-            values[at], gradients[:, at], hessians[:, :, at] = self._gauge.derivatives(
-                points.take(at, axis=1), np.zeros(len(at))
+            found.values[at], found.gradients[:, at], found.hessians[:, :, at] = (
+                self._gauge.derivatives(points.take(at, axis=1), np.zeros(len(at)))
             )
-        for array, other in zip((points, gradients, hessians), others, strict=True):
-            array[..., place] = other.take(left, axis=-1)
-        return values, points, gradients, hessians
+        return found
 
     def starts(self, normals: Floats) -> tuple[Floats, Floats, Floats]:
         """Return starts (3, m) for vectors (3, m), with their gradients and Hessians (3, 3, m)."""
