@@ -150,17 +150,6 @@ class SmoothSupportSolver:
         across = self.frame[1:, :, -count:]
         self._place[:, -count:] = np.einsum("zcn,cn->zn", across, motions)
 
-    def begin_further(self, shares: Floats) -> None:
-        """Look for the motions where another model has them, to first order.
-
-        Args:
-            shares: By which share of itself the speed of every term is larger than where
-                `gradients` were taken last, shape (k,).
-        """
-        place, gradients, hessian = self._known
-        changes = (shares @ gradients.reshape(len(shares), -1)).reshape(place.shape)
-        self._place = place + _newton_step(changes, hessian)
-
     def solve(self, matrices: Floats) -> None:
         """Find the motions under the model with these matrices, shape (k, 3, 3)."""
         self._entries = np.ascontiguousarray(matrices[:, _ROWS, _COLUMNS])

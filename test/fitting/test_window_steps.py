@@ -4,9 +4,14 @@
 import numpy as np
 
 from limit_surface_ros.fitting.few_pushes.pressure import SmallContacts
-from limit_surface_ros.fitting.few_pushes.window import Window, _damped_step, _Errors
+from limit_surface_ros.fitting.few_pushes.window import (
+    _LEAST_DAMPING,
+    Window,
+    _damped_step,
+    _Errors,
+)
 from limit_surface_ros.fitting.motion_cost import SmoothSupportSolver
-from limit_surface_ros.fitting.pairs import scale_pairs
+from limit_surface_ros.fitting.pairs import ScaledPairs, scale_pairs
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.pairs import Pairs
@@ -41,33 +46,45 @@ def test_slopes_agree_with_finite_differences():
     np.testing.assert_allclose(2.0 * rows @ residuals, numeric, rtol=1e-5, atol=1e-6)
 
 
-def test_the_search_finds_the_same_motions_from_where_a_step_leads():
+def test_the_search_finds_the_same_motions_from_those_of_another_model():
     growth = np.random.default_rng(4).normal(size=37)
     contacts = SmallContacts.around([(1.5, 3)])
     loads = np.ascontiguousarray(noisy_pairs(20).wrenches.T)
-
-    def grown(step):
-        return contacts.speeds * np.exp(2.0 * step)[:, None, None]
-
-    def solver():
-        found = SmoothSupportSolver(loads)
-        found.solve(contacts.speeds)
-        assert found.gradients.shape == (37, 2, 20)
-        return found
-
-    cold, warm = SmoothSupportSolver(loads), solver()
-    cold.solve(grown(growth))
-    warm.begin_further(np.expm1(growth))
-    warm.solve(grown(growth))
+    grown = contacts.speeds * np.exp(2.0 * growth)[:, None, None]
+    cold, warm = SmoothSupportSolver(loads), SmoothSupportSolver(loads)
+    cold.solve(grown)
+    warm.solve(contacts.speeds)
+    warm.solve(grown)
     np.testing.assert_allclose(warm.motions, cold.motions, atol=1e-8)
-    # Of a small step, all but a hundredth is foreseen.
-    solved, foreseen = solver(), solver()
-    before = solved._place
-    solved.solve(grown(1e-4 * growth))
-    foreseen.begin_further(np.expm1(1e-4 * growth))
-    change = np.abs(solved._place - before).max()
-    assert change > 1e-6
-    assert np.abs(solved._place - foreseen._place).max() < 0.01 * change
+
+
+def learnt(window, pairs):
+    """Return a window that has learnt pairs in their order."""
+    for count, (load, motion) in enumerate(zip(pairs.wrenches, pairs.directions, strict=True), 1):
+        window.learn(load, motion, count)
+    return window
+
+
+def test_a_fold_is_one_step_on_the_pushes_that_remain():
+    window = learnt(Window(Dissipation(np.eye(3)[None], SCALING), 14, 1.0), noisy_pairs(14))
+    fit, pairs = window._fit, window._pairs()
+    left_out = np.array([0, 5, 13])
+    remain = np.delete(np.arange(14), left_out)
+    rest = ScaledPairs(pairs.wrenches[remain], pairs.directions[remain], SCALING)
+    errors = _Errors(rest, fit.motions[:, remain])
+    errors.cost(fit._matrices(fit._parameters))
+    step = _damped_step(*fit._normal_equations(*errors.rows()), _LEAST_DAMPING)
+    (limits,) = fit.limits_without(pairs, [left_out])
+    np.testing.assert_allclose(limits, np.exp(fit._parameters + step), rtol=1e-6)
+    assert np.abs(step).max() > 0.01
+
+
+def test_a_window_that_begins_anew_keeps_the_last_pushes_and_the_contacts_of_the_other():
+    prior, pairs = Dissipation(np.eye(3)[None], SCALING), noisy_pairs(9)
+    window, other = learnt(Window(prior, 8, 1.0), pairs), learnt(Window(prior, 8, 0.5), pairs)
+    window.begin_anew(other, 3)
+    np.testing.assert_array_equal(window._pairs().wrenches, pairs.wrenches[-3:])
+    np.testing.assert_array_equal(window.surface(6).matrices, other.surface(6).matrices)
 
 
 def test_asking_for_motions_changes_nothing_of_what_is_learnt():
@@ -90,3 +107,5 @@ def test_no_step_is_taken_where_the_matrix_is_not_positive_definite():
     slope = np.array([1.0, 2.0])
     assert not _damped_step(np.diag([1.0, -3.0]), slope, 0.1).any()
     np.testing.assert_allclose(_damped_step(np.diag([1.0, 3.0]), slope, 1.0), [-0.5, -0.5])
+    # Where limits hardly matter a step would lead anywhere.
+    np.testing.assert_allclose(_damped_step(np.diag([1e-9, 1.0]), slope, 0.0), [-2.0, -2.0])

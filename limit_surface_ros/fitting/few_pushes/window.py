@@ -190,7 +190,6 @@ class _Fit:
                 equations = self._normal_equations(*errors.rows())
             hessian, slope = equations
             step = _damped_step(hessian, slope, self._damping)
-            errors.begin_further(step)
             cost = self._cost(self._parameters + step, errors)
             if cost < self.cost:
                 self._parameters = self._parameters + step
@@ -250,7 +249,7 @@ def _damped_step(hessian: Floats, slope: Floats, damping: float) -> Floats:
     """
     damped = hessian.copy()
     damped.flat[:: len(slope) + 1] += damping
-    # Cholesky's factor takes half the time of the LU that numpy's `solve` makes.
+    # Of such a matrix there is no Cholesky factor.
     _, step, not_definite = dposv(damped.T, slope, lower=1, overwrite_a=1)
     if not_definite:
         return np.zeros_like(slope)
@@ -289,10 +288,6 @@ class _Errors:
         self._log_factors = -np.log(solver.dissipation)
         loss, _ = direction_loss(cosines, ROBUST_SCALE)
         return float(self._weights @ (self._log_factors**2 + 2.0 * loss))
-
-    def begin_further(self, step: Floats) -> None:
-        """Look for the motions where a step from where `rows` were taken last leads them."""
-        self._solver.begin_further(np.expm1(step))
 
     def rows(self) -> tuple[Floats, Floats]:
         """Return slopes by the logarithms of the limits, a row for each, and the residuals."""
