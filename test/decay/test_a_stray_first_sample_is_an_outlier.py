@@ -6,7 +6,7 @@ import pytest
 from scipy.special import erfcx
 
 from limit_surface_ros.decay.fit import fit_decay
-from limit_surface_ros.decay.outliers import starts_alone, stray_start
+from limit_surface_ros.decay.outliers import neighbour_weights, starts_alone, stray_start
 from limit_surface_ros.decay.targets import Record
 from limit_surface_ros.tools.common.decay_input import of_record
 from limit_surface_ros.tools.common.decay_report import doubts, report
@@ -55,6 +55,39 @@ def test_steep_starts_are_not_astray(samples, noise):
     for clean in (*powers, np.exp(-4.0 * times**0.3), *fast, slow + pulse):
         values = clean + noise * np.random.default_rng(1).normal(size=samples)
         assert not stray_start(times, values, noise).any()
+
+
+@pytest.mark.parametrize("samples", [20, 30])
+def test_steep_starts_of_short_records_are_not_astray_where_noise_is_not_known(samples):
+    index = np.arange(samples)
+    slow = np.exp(-3.0 * index / (samples - 1.0))
+    for seed in range(40):
+        noise = 0.02 * np.random.default_rng(seed).normal(size=samples)
+        for size in (20.0, -20.0):
+            values = slow + size * 0.15**index + noise
+            assert not stray_start(index / (samples - 1.0), values, 0.0).any()
+
+
+def test_a_long_first_step_may_have_hidden_anything():
+    times = np.append(0.0, 0.03 * np.arange(20, 220))
+    values = 3.0 * np.exp(-times) + 100.0 * np.exp(-20.0 * times)
+    assert not stray_start(times, values, 0.0).any()
+
+
+@pytest.mark.parametrize(("share", "astray"), [(-12.0, [0]), (12.0, []), (20.0, [0])])
+def test_a_power_law_explains_a_first_sample_of_its_sign_and_size_alone(share, astray):
+    values = erfcx(np.sqrt(1000.0 * TIMES))
+    values[0] = share * values[1]
+    np.testing.assert_array_equal(np.flatnonzero(stray_start(TIMES, values, 0.0)), astray)
+
+
+def test_a_misfit_of_a_steep_start_is_no_outlier():
+    residuals = 0.01 * np.random.default_rng(0).normal(size=40)
+    residuals[:3] += [5.0, 2.0, 1.0]
+    residuals[20] += 1.0
+    weights = neighbour_weights(residuals, 0.01)
+    np.testing.assert_array_equal(weights[:3], 1.0)
+    assert weights[20] == 0.0
 
 
 def test_a_first_sample_that_could_be_either_is_kept_with_a_warning():

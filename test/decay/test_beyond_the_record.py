@@ -96,9 +96,12 @@ def test_the_envelope_is_the_largest_value_of_the_last_tenth_but_for_outliers():
     values = values.copy()
     values[195] = 7.0
     assert envelope_of(Record(times, values), 10.0) == pytest.approx(np.exp(-0.9))
+    # A sample that is all that is known of the last tenth counts, however far it stands out.
+    alone = Record(np.append(times, 15.0), np.append(np.exp(-0.1 * times), 7.0))
+    assert envelope_of(alone, 15.0) == 7.0
 
 
-@pytest.mark.parametrize("end", np.linspace(2.5, 9.5, 15))
+@pytest.mark.parametrize("end", [2.1, *np.linspace(2.5, 9.5, 15)])
 def test_a_swing_that_crosses_zero_where_the_record_ends_is_expected_to_go_on(end):
     def swing(t):
         return np.exp(-0.15 * t) * np.cos(2.0 * t + 0.4)

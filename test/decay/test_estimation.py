@@ -191,6 +191,7 @@ def test_outliers_are_gated_and_the_estimate_holds():
         value = float(response(t)) + NOISE * random.normal()
         assert estimator.add(t, value + spoilt * random.choice([-40.0, 40.0])) is not spoilt
     assert estimator.outliers == wild
+    assert (estimator.bounds(np.array([1e99, 1e308])) < 1.0).all()
     assert np.abs(estimator.learnt(HORIZON) - response(HORIZON)).max() < 0.05
 
 
@@ -225,6 +226,8 @@ def test_thousands_of_samples_of_nothing_spoil_nothing_and_need_no_memory():
     for t in 20.0 + np.arange(3000) * 0.01:
         estimator.add(t, NOISE * random.normal())
     assert len(estimator._times) <= 401
+    # The first samples are thinned out, not forgotten.
+    assert estimator._times[0] < 1.0
     assert np.isfinite(estimator.learnt(HORIZON)).all()
     assert np.abs(estimator.learnt(HORIZON) - 1.2 * KINKED(HORIZON)).max() < 0.5
 

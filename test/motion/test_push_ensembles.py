@@ -112,6 +112,17 @@ def test_recorded_ends_make_the_ellipse_hold_what_it_says():
     assert np.mean(calibrated) == pytest.approx(0.9, abs=0.05)
 
 
+def test_what_members_that_agree_do_not_know_is_the_scatter_of_recorded_ends():
+    ends = [EndPoses(np.ones((5, 3)))] * 400
+    recorded = 1.0 + 1e-3 * np.random.default_rng(2).normal(size=(400, 3))
+    recorded[:20] += 1.0
+    known = calibrate_ends(ends, recorded)
+    assert known.deviation == pytest.approx(1e-3, rel=0.1)
+    # Of a round normal distribution nine of ten lie within this circle, of these 0.95 do.
+    within = 1e-3 * np.sqrt(-2.0 * np.log(1.0 - 0.9 / 0.95))
+    np.testing.assert_allclose(known.ellipse(ends[0], 0.9).half_axes, within, rtol=0.1)
+
+
 def test_nine_recorded_ends_are_the_fewest_for_nine_of_ten():
     ends, recorded = thin_ensembles(9, np.random.default_rng(1))
     known = calibrate_ends(ends, recorded)
