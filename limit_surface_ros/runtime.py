@@ -13,10 +13,11 @@ import ctypes
 import functools
 import importlib
 import os
+import signal
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 _LAST_STANDARD = 2
 # Exit code of a program that was interrupted: that of a shell for SIGINT.
 INTERRUPTED = 130
+# What tells a node to end, and the programs that are nodes.
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+NODES = ("limit_surface_node", "decay_node", "force_motion_nodes")
 # Of malloc.h.
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 # What BLAS libraries read when they are loaded.
@@ -43,9 +47,13 @@ def run(package: str, name: str) -> int:
         name: Its module there, which has a function `main`.
 
     Returns:
-        The exit code: what `main` returns, or 130 after an interrupt that it did not see to.
+        The exit code: what `main` returns, or 130 after an interrupt that it did not see to. A
+        node that is told to end while it is imported ends there and then, with 0.
     """
     mend_standard_streams()
+    if name in NODES:
+        # Nothing has begun yet; whoever runs it takes any other code for a failure.
+        on_ending(lambda *_: os._exit(0))
     try:
         return int(importlib.import_module(f"{package}.{name}").main())
     except KeyboardInterrupt:
@@ -69,6 +77,16 @@ def mend_standard_streams() -> None:
             setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
         elif stream.errors == "strict" and hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
+
+
+def on_ending(handler: Any) -> None:
+    """Have a handler called, or `signal.SIG_IGN`, when a signal tells a node to end.
+
+    Not by SIGHUP under nohup, where a process is to outlive its terminal.
+    """
+    for number in ENDING:
+        if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, handler)
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Programs in process groups of their own, none of which outlives its test."""
 
+import contextlib
 import functools
 import os
 import signal
@@ -82,3 +83,14 @@ def group_is_gone(group: int) -> bool:
     except ProcessLookupError:
         return True
     return False
+
+
+def processes_of_group(group: int) -> list[int]:
+    """Return the processes of a group."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        # One may end while it is looked at.
+        with contextlib.suppress(ProcessLookupError):
+            if os.getpgid(int(entry.name)) == group:
+                found.append(int(entry.name))
+    return found

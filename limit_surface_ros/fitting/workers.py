@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 _MOST_PER_CORE = 4
 # Time in which the pool's thread, on the busiest machine, drops what waits [s].
 _PATIENCE = 60.0
+# What a terminal sends to all processes of a program: at Ctrl-C, and when it is closed.
+_OF_TERMINALS = (signal.SIGINT, signal.SIGHUP)
 # Of a pipe's content that is taken out at once [bytes], and time between looks at its user [ms].
 _PIECE = 2**16
 _LOOK = 50
@@ -54,7 +56,9 @@ def worker_processes(workers: int) -> Iterator[Executor]:
     others = set(multiprocessing.active_children())
     size = min(workers, _MOST_PER_CORE * available_cores())
     context = _Fork() if _may_fork() else _Spawn()
-    pool = ProcessPoolExecutor(size, mp_context=context, initializer=_begin)
+    # The first pool starts a process that keeps count of semaphores: it has this thread's mask.
+    with _interrupts_blocked():
+        pool = ProcessPoolExecutor(size, mp_context=context, initializer=_begin)
     try:
         yield pool
     except BaseException:
@@ -84,8 +88,8 @@ def _may_fork() -> bool:
 
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Block SIGINT in this thread, and so in a process that is started here until `_begin`."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    """Block what terminals send in this thread, and so in what is started here until `_begin`."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _OF_TERMINALS)
     try:
         yield
     finally:
@@ -172,9 +176,10 @@ class _Drain:
 
 
 def _begin() -> None:
-    # A terminal interrupts the whole group: what becomes of the workers is the parent's to say.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    # A terminal tells the whole group: what becomes of the workers is the parent's to say.
+    for number in _OF_TERMINALS:
+        signal.signal(number, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _OF_TERMINALS)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

@@ -24,7 +24,7 @@ from limit_surface_ros.nodes.messages import convert
 from limit_surface_ros.surface.kinds.dissipation import Dissipation
 from limit_surface_ros.surface.scaling import Scaling
 from node_helpers import Program, processor_ticks, wrench_message
-from process_helpers import WAIT, started_python
+from process_helpers import WAIT, group_is_gone, processes_of_group, started_python, until
 
 BATCHES = 20
 
@@ -125,6 +125,34 @@ def test_a_terminal_that_is_closed_ends_the_node_as_sigterm_does(ros, client_nod
     assert "Traceback" not in output
 
 
+def test_a_terminal_that_is_closed_ends_a_node_that_learns_without_a_word(
+    ros, client_node, model_file
+):
+    module = "limit_surface_ros.nodes.limit_surface_node"
+    options = "-p", f"model_files:=['{model_file()[1]}']", "-p", "learn:=true"
+    reset = "import signal; signal.signal(signal.SIGHUP, signal.SIG_DFL)"
+    command = f"{reset}; import sys; from {module} import main; sys.exit(main())"
+    process = started_python(
+        "-c",
+        command,
+        "--ros-args",
+        *options,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+    )
+    ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
+    # Itself, the process that counts semaphores, and the one that learns.
+    until(lambda: len(processes_of_group(process.pid)) == 3, "the process that learns")
+    # A terminal tells all of them, and so does a second one that ends the shell.
+    os.killpg(process.pid, signal.SIGHUP)
+    os.killpg(process.pid, signal.SIGHUP)
+    output, _ = process.communicate(timeout=WAIT)
+    assert process.returncode == 0, output
+    assert "Traceback" not in output
+    assert "died" not in output
+    until(lambda: group_is_gone(process.pid), "the end of its processes")
+
+
 def test_under_nohup_a_node_outlives_its_terminal(ros, client_node, model_file):
     options = "-p", f"model_files:=['{model_file()[1]}']"
     with started_with(signal.SIG_IGN, *options) as program:
@@ -182,3 +210,22 @@ def test_a_second_signal_refuses_what_has_begun(ros, client_node, tmp_path):
     assert code == 0, output
     assert ros.done(answered, WAIT)
     assert answered.result().error_code == ErrorCode.UNAVAILABLE
+
+
+def test_signals_after_the_end_change_nothing(ros, client_node, model_file):
+    again = "[os.kill(os.getpid(), number) for number in (2, 15)]"
+    command = "import os, sys; from limit_surface_ros.nodes.limit_surface_node import main; "
+    process = started_python(
+        "-c",
+        f"{command}code = main(); {again}; sys.exit(code)",
+        "--ros-args",
+        "-p",
+        f"model_files:=['{model_file()[1]}']",
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+    )
+    ros.client(client_node, WrenchToTwist, "/limit_surface/wrench_to_twist")
+    process.send_signal(signal.SIGTERM)
+    output, _ = process.communicate(timeout=WAIT)
+    assert process.returncode == 0, output
+    assert "ignored" not in output

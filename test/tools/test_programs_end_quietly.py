@@ -97,6 +97,25 @@ def test_an_interrupt_while_a_program_still_imports_is_told_in_one_line(tmp_path
     assert ended.stderr == f"{program}: interrupted\n"
 
 
+@pytest.mark.parametrize("number", runtime.ENDING)
+@pytest.mark.parametrize("program", runtime.NODES)
+def test_a_node_that_is_told_to_end_while_it_imports_ends_with_0(tmp_path, program, number):
+    stand_in = f"import os, time; os.kill(os.getpid(), {int(number)}); time.sleep(3600)\n"
+    for name in ("numpy", "rclpy", "geometry_msgs"):
+        (tmp_path / f"{name}.py").write_text(stand_in)
+    command = "import signal, sys; signal.signal(signal.SIGHUP, signal.SIG_DFL); "
+    command += f"from limit_surface_ros.runtime import nodes; sys.exit(nodes.{program}())"
+    paths = os.pathsep.join([str(tmp_path), str(REPOSITORY), os.environ.get("PYTHONPATH", "")])
+    ended = subprocess.run(
+        [sys.executable, "-c", command],
+        env=os.environ | {"PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (ended.returncode, ended.stdout + ended.stderr) == (0, "")
+
+
 def test_every_installed_program_starts_where_interrupts_are_quiet(monkeypatch):
     setuptools = pytest.importorskip("setuptools", reason="setuptools is not installed")
     given = {}

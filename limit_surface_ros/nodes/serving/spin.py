@@ -31,14 +31,13 @@ from rclpy.utilities import remove_ros_args
 from limit_surface_ros.errors import FileError, LimitSurfaceError, RangeError
 from limit_surface_ros.nodes.serving import middleware
 from limit_surface_ros.nodes.serving.settings import Setting, help_of
-from limit_surface_ros.runtime import keep_large_pieces, mend_standard_streams
+from limit_surface_ros.runtime import keep_large_pieces, mend_standard_streams, on_ending
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from limit_surface_ros.nodes.serving.endpoints import Endpoints
 
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # What a user gets wrong at start is told in one line, without a traceback. rcl's errors, unknown
 # ROS arguments among them, are RuntimeErrors.
 _CONFIGURATION_ERRORS = (LimitSurfaceError, ParameterException, RuntimeError)
@@ -107,10 +106,24 @@ def run(
     woken, wakes = socket.socketpair()
     wakes.setblocking(False)
     signal.set_wakeup_fd(wakes.fileno())
-    for number in ENDING:
-        # Under nohup a process is to outlive its terminal.
-        if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, lambda *_: None)
+    on_ending(lambda *_: None)
+    try:
+        return _run(make_nodes, tables, description, argv, woken, wakes)
+    finally:
+        # Python would end by a signal that comes while it ends itself, and has nobody to wake.
+        on_ending(signal.SIG_IGN)
+        signal.set_wakeup_fd(-1)
+
+
+def _run(
+    make_nodes: Callable[[], Sequence[Any]],
+    tables: Mapping[str, Iterable[Setting]],
+    description: str,
+    argv: Sequence[str],
+    woken: socket.socket,
+    wakes: socket.socket,
+) -> int:
+    """Do what `run` does, with signals that are read from `woken` and come from `wakes`."""
     parser = argparse.ArgumentParser(
         description=description,
         epilog="\n\n".join([_EPILOG, *(help_of(name, table) for name, table in tables.items())]),
