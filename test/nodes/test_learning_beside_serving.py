@@ -299,6 +299,30 @@ def test_what_is_learnt_can_be_saved_later_where_its_folder_was_read_only_or_gon
     assert len(read_surface_model(saved).fit["online"]["pushes"]) == 1
 
 
+def test_what_another_node_has_saved_is_not_written_over(ros, client_node, prior, tmp_path):
+    saved = tmp_path / "learnt.yaml"
+    parameters = {"learn": True, "learn_file": str(saved)}
+    node = ros.add(LimitSurfaceNode, files=[prior], parameters=parameters)
+    other = ros.add(
+        LimitSurfaceNode, files=[prior], parameters=parameters, remap=["__node:=other"]
+    )
+    save = ros.client(client_node, Trigger, "/limit_surface/save_learnt")
+    save_other = ros.client(client_node, Trigger, "/other/save_learnt")
+    Robot(ros, client_node).push(node, BODY, 1, 1)
+    other.learner._model = node.learner._model
+    assert save(Trigger.Request()).success
+    # Its own file is saved anew as often as it is asked for.
+    assert save(Trigger.Request()).success
+    theirs = saved.read_bytes()
+    refused = save_other(Trigger.Request())
+    assert not refused.success
+    assert "somebody else has written it" in refused.message
+    assert other.health.refused["save_learnt", "BAD_FILE"] == 1
+    assert saved.read_bytes() == theirs
+    saved.rename(tmp_path / "theirs.yaml")
+    assert save_other(Trigger.Request()).success
+
+
 def test_learning_goes_on_when_the_clock_is_set_back(ros, client_node, prior):
     node = ros.add(LimitSurfaceNode, files=[prior], parameters={"learn": True})
     robot = Robot(ros, client_node)

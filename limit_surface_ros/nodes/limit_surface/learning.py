@@ -14,6 +14,7 @@ import queue
 import threading
 from concurrent.futures import TimeoutError as FutureTimeout
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,11 +22,13 @@ from geometry_msgs.msg import TwistStamped, WrenchStamped
 
 from limit_surface_ros.errors import DataError, FileError, LimitSurfaceError, UnavailableError
 from limit_surface_ros.files.atomic_write import check_writable
+from limit_surface_ros.files.regular_file import read_bytes
 from limit_surface_ros.files.surface_file import (
     SurfaceModel,
     read_surface_model,
     write_surface_model,
 )
+from limit_surface_ros.files.yaml_reader import MAX_BYTES
 from limit_surface_ros.nodes.limit_surface.measurement_pairs import SAME_TIME, MeasurementPairs
 from limit_surface_ros.nodes.messages import convert
 from limit_surface_ros.nodes.messages.planar_input import LEARNT
@@ -116,6 +119,8 @@ class Learner:
         self.name = self._prior.name + LEARNT
         self._path = node.values["learn_file"]
         self._forgetting = "blend" if node.values["learn_forgetting"] == "blend" else 1.0
+        # What the file held when this node read or wrote it last.
+        self._known: bytes | None = None
         stored = self._stored()
         self._state = None if stored is None else stored.fit["online"]
         self._segments = Segments(self._prior.surface.scaling)
@@ -300,6 +305,7 @@ class Learner:
             return None
         from limit_surface_ros.fitting.few_pushes.online import pushes_of_state
 
+        self._known = self._content()
         model = read_surface_model(self._path)
         stored = model.fit.get("online")
         if stored is None:
@@ -317,12 +323,22 @@ class Learner:
             )
         return model
 
+    def _content(self) -> bytes | None:
+        """Return what the file holds, None where there is none."""
+        return read_bytes(self._path, MAX_BYTES) if Path(self._path).exists() else None
+
     def _save(self, _: Trigger.Request, response: Trigger.Response) -> None:
         """Answer `~/save_learnt`."""
         if not self._path:
             raise UnavailableError("learn_file names no file")
         if self._model is None:
             raise UnavailableError("nothing has been learnt yet")
+        if self._content() not in (None, self._known):
+            raise FileError(
+                f"{self._path}: somebody else has written it since this node read or wrote it: "
+                "move it away to save what this node has learnt"
+            )
         write_surface_model(self._model, self._path, header="Written by limit_surface_node")
+        self._known = self._content()
         response.success = True
         response.message = f"{self._path}: {self.name}, {self.count} pushes"
