@@ -19,7 +19,7 @@ from limit_surface_interfaces.msg import ErrorCode
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from limit_surface_ros.errors import FileError, LimitSurfaceError, RangeError
-from limit_surface_ros.nodes.clients.plain_messages import fill, plain, type_of
+from limit_surface_ros.nodes.clients.plain_messages import fill, text_of, type_of
 from limit_surface_ros.nodes.clients.service_client import ServiceClient
 
 if TYPE_CHECKING:
@@ -340,27 +340,6 @@ def frame_of(client: ServiceClient, name: str, model: str, wait: float) -> str:
     models = client.call(service, lists, service.Request(), wait).models
     named = [each for each in models if not model or each.name == model]
     return str(getattr(named[0], "frame_id", "")) if named else ""
-
-
-def text_of(message: Any) -> str:
-    """Return a message as YAML, texts of several lines as such."""
-    return str(
-        yaml.dump(plain(message), Dumper=_Readable, sort_keys=False, default_flow_style=None)
-    ).rstrip()
-
-
-class _Readable(yaml.SafeDumper):
-    """Writes texts of several lines line by line."""
-
-
-def _text(dumper: _Readable, text: str) -> yaml.ScalarNode:
-    """Represent a text."""
-    return dumper.represent_scalar(
-        "tag:yaml.org,2002:str", text, style="|" if "\n" in text else None
-    )
-
-
-_Readable.add_representer(str, _text)
 
 
 def code_name(code: int) -> str:

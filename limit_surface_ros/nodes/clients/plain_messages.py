@@ -8,6 +8,8 @@ import re
 from array import array
 from typing import TYPE_CHECKING, Any
 
+import yaml
+
 from limit_surface_ros.errors import RangeError, shortened
 
 if TYPE_CHECKING:
@@ -105,3 +107,24 @@ def plain(message: Any) -> Any:
     if len(message) > _SHOWN:
         values.append(f"... {len(message)} in all")
     return values
+
+
+def text_of(message: Any) -> str:
+    """Return a message as YAML, texts of several lines as such."""
+    return str(
+        yaml.dump(plain(message), Dumper=_Readable, sort_keys=False, default_flow_style=None)
+    ).rstrip()
+
+
+class _Readable(yaml.SafeDumper):
+    """Writes texts of several lines line by line."""
+
+
+def _text(dumper: _Readable, text: str) -> yaml.ScalarNode:
+    """Represent a text."""
+    return dumper.represent_scalar(
+        "tag:yaml.org,2002:str", text, style="|" if "\n" in text else None
+    )
+
+
+_Readable.add_representer(str, _text)
