@@ -60,12 +60,13 @@ def test_steep_starts_are_not_astray(samples, noise):
 @pytest.mark.parametrize("samples", [20, 30])
 def test_steep_starts_of_short_records_are_not_astray_where_noise_is_not_known(samples):
     index = np.arange(samples)
-    slow = np.exp(-3.0 * index / (samples - 1.0))
+    times = index / (samples - 1.0)
+    powers = [erfcx(np.sqrt(rate * times)) for rate in (1.0, 30.0, 1000.0)]
+    fast = [np.exp(-3.0 * times) + size * 0.15**index for size in (20.0, -20.0, 3.0)]
     for seed in range(40):
         noise = 0.02 * np.random.default_rng(seed).normal(size=samples)
-        for size in (20.0, -20.0):
-            values = slow + size * 0.15**index + noise
-            assert not stray_start(index / (samples - 1.0), values, 0.0).any()
+        for clean in (*powers, *fast):
+            assert not stray_start(times, clean + noise, 0.0).any()
 
 
 def test_a_long_first_step_may_have_hidden_anything():

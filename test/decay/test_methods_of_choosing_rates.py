@@ -174,3 +174,16 @@ def test_the_best_is_best_in_the_norm_that_is_asked_for():
     for method in ("polished", "neutral"):
         other = fit_decay(record, 7, 6.0, method, "2").fit
         assert best.grid_error <= other.grid_error * (1.0 + 1e-9)
+
+
+def test_auto_ends_when_more_terms_no_longer_lower_the_error():
+    times = np.linspace(0.0, 6.0, 201)
+    values = 3.0 * np.exp(-times) + 2.0 * np.exp(-4.0 * times)
+    # A sample that is off by 1 leaves an error of a half, however many terms there are.
+    values[100] += 1.0
+    lines = []
+    fit = fit_decay(
+        Record(times, values), "auto", 6.0, options=Options(robust=False), progress=lines.append
+    )
+    assert fit.fit.max_error == pytest.approx(0.5, abs=0.01)
+    assert sum(line.startswith("esprit:") for line in lines) < 10

@@ -171,6 +171,14 @@ def test_an_overlap_at_the_start_is_kept_or_pushed_out(overlap, inward, angle):
     assert gap == pytest.approx(-depth if overlap == "keep" else 0.0, abs=1e-6)
 
 
+@pytest.mark.parametrize("start", [[0.004, 0.003], [0.002, 0.004]])
+def test_an_overlap_with_both_sides_of_an_inward_corner_is_pushed_out_of_both(start):
+    sides = Polygon([[-0.05, -0.05], [0.05, -0.05], [0.05, 0], [0, 0], [0, 0.05], [-0.05, 0.05]])
+    body, still = SURFACES["ellipsoid"], [start, np.add(start, 1e-6)]
+    run = simulate_push(body, sides, TIP, 0.3, [0, 0, 0], still, overlap="push_out")
+    np.testing.assert_allclose(run.poses[0], [start[0] - TIP, start[1] - TIP, 0.0], atol=1e-12)
+
+
 @pytest.mark.parametrize("kind", SURFACES)
 def test_a_tip_in_an_inward_corner_holds_the_body_and_never_enters_it(kind):
     rng = np.random.default_rng(7)
