@@ -257,3 +257,28 @@ def test_derivatives_are_numbers_in_any_unit(kind, force):
         unit = 1.0 if method == "wrench_jacobian" else force
         found = getattr(scaled_up, method)(given * unit)[1]
         assert np.allclose(found / factor, right, rtol=1e-9, atol=1e-12 * np.abs(right).max())
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_beside_creases_and_at_corners_the_load_turns_as_differences_say(seed):
+    # Terms of rank one make creases, along which nearly every load of maximum dissipation lies;
+    # those of rank two, of unlike sizes, corners at which it stays.
+    rng = np.random.default_rng([29, seed])
+    roots = [
+        rng.normal(size=(rank, 3)) * 10.0 ** rng.uniform(-3.0, 0.0, size=3)
+        for rank in (1, 1, 2, 2, 2)
+    ]
+    surface = PowerSum.norms([root.T @ root for root in roots])
+    twists = rng.normal(size=(5, 3))
+    loads, many = surface.wrench_jacobian(twists)
+    step = 1e-6
+    for twist, load, jacobian in zip(twists, loads, many, strict=True):
+        one = surface.wrench_jacobian(twist)[1]
+        size = np.abs(one).max()
+        assert np.abs(one - jacobian).max() <= 1e-9 * size + 1e-12 * np.abs(load).max()
+        columns = [
+            (surface.wrench_of_twist(twist + way) - surface.wrench_of_twist(twist - way))
+            / (2.0 * step)
+            for way in step * np.eye(3)
+        ]
+        assert np.abs(np.array(columns).T - jacobian).max() <= 1e-5 * size + 1e-7

@@ -22,11 +22,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limit_surface_ros.surface.gauges.gauge import Turning
 from limit_surface_ros.surface.linalg import squared_lengths
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Bools, Floats
-    from limit_surface_ros.surface.gauges.gauge import Gauge, Turning
+    from limit_surface_ros.surface.gauges.gauge import Gauge
 
 # Product of the two curvatures of a surface, in parts of the square of their sum, below which it
 # is flat in one direction.
@@ -41,8 +42,11 @@ ROUNDED = 1e-27
 _BESIDE = 1e-6
 # Square of a vector's length beyond which its powers may not be numbers.
 _LARGE = 1e120
-# One over the curvature that stands for that of a kink.
-_SOFTNESS = 1e-12
+# Second invariant of the kinks' matrix, in parts of the square of its trace, up to which it has
+# rank one.
+_ONE_RANK = 1e-14
+# Curvature along a crease, in parts of the usual, up to which it is straight.
+_STRAIGHT = 1e-12
 # Rows of a symmetric matrix as entries of its six.
 ENTRIES = [[0, 1, 2], [1, 3, 4], [2, 4, 5]]
 
@@ -185,12 +189,50 @@ def _off(normals: Floats, points: Floats, turning: Turning) -> tuple[Floats, Flo
 
 
 def _of_turning(normals: Floats, points: Floats, turning: Turning) -> tuple[Floats, Bools]:
-    six = turning.matrices
-    if turning.kinks is not None:
-        # As large as still leaves digits to the other direction.
-        sizes = squared_lengths(turning.normals) / squared_lengths(points)
-        six = six + turning.kinks * (np.sqrt(sizes) / _SOFTNESS)
-    return support_hessians(normals, points, turning.normals, six)
+    if turning.kinks is None:
+        return _smooth_hessians(normals, points, turning)
+    found = np.empty_like(turning.matrices)
+    whole = np.empty(points.shape[1], dtype=bool)
+    kinked = turning.kinks.any(axis=0)
+    for at, hessians in ((~kinked, _smooth_hessians), (kinked, _kinked_hessians)):
+        some = Turning(
+            turning.values[at],
+            turning.normals[:, at],
+            turning.matrices[:, at],
+            turning.kinks[:, at],
+        )
+        found[:, at], whole[at] = hessians(normals[:, at], points[:, at], some)
+    return found, whole
+
+
+def _smooth_hessians(normals: Floats, points: Floats, turning: Turning) -> tuple[Floats, Bools]:
+    return support_hessians(normals, points, turning.normals, turning.matrices)
+
+
+def _kinked_hessians(normals: Floats, points: Floats, turning: Turning) -> tuple[Floats, Bools]:
+    """Return what `of_support` does where a norm is zero: the limit of infinite curvature there.
+
+    With K + s C for K, the formula of this module has the limit [n] C [n]' / (K : [n] C [n]') for
+    s to infinity if the kinks' C has rank one, the crease's, along which alone the point moves.
+    With a larger rank it stays where it is.
+    """
+    kinks, six = turning.kinks, turning.matrices
+    assert kinks is not None
+    a, b, c, d, e, f = kinks
+    # C x is zero and n.x is not: across n, too, C has the rank of the whole.
+    crease = a * d + a * f + d * f - b * b - c * c - e * e <= _ONE_RANK * np.square(a + d + f)
+    found = _twice_crossed(normals, kinks)
+    curvatures = np.einsum("im,im->m", six, found)
+    for entry in (1, 2, 4):
+        curvatures += six[entry] * found[entry]
+    along = found[0] + found[3] + found[5]
+    sizes = np.sqrt(squared_lengths(turning.normals) / squared_lengths(points))
+    curved = curvatures > _STRAIGHT * along * sizes
+    factors = np.einsum("im,im->m", turning.normals, points)
+    factors /= np.einsum("im,im->m", normals, points)
+    factors /= np.where(curved, curvatures, np.inf)
+    found *= factors * crease
+    return found, curved | ~crease
 
 
 def support_hessians(
