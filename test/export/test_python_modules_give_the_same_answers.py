@@ -125,3 +125,34 @@ def test_jax_functions_are_the_closed_maps_and_have_derivatives(name, tmp_path, 
         assert error.max() < 1e-12
         gradient = jax.vmap(jax.grad(module.dissipation))(twists[:50])
         assert np.allclose(gradient, module.wrench_of_twist(twists[:50]), rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["thesis_2", "norms_with_corners", "triangle", "polynomial"])
+def test_jax_has_answers_at_extreme_sizes_and_at_kinks_and_none_of_what_is_not_finite(
+    name, tmp_path, jax
+):
+    surface = MODELS[name]
+    model = portable(surface)
+    module = loaded(jax_module(model, name, "A surface."), tmp_path)
+    rows = [[1e-300, 2e-300, 1e-301], [1e300, -1e300, 1e299], [0.0, 0.0, 1.0], [1e-160, 0.0, 0.0]]
+    if name == "triangle":
+        # Rotations about support points: these add nothing to the load.
+        rows += [[y, -x, 1.0] for x, y in surface.points]
+    rows = np.array(rows)
+    bad = np.array([[np.nan, 0.0, 0.0], [np.inf, 0.0, 0.0], [0.0, -np.inf, 1.0]])
+    if model.gauge_of_loads:
+        size, map_, right = module.load_factor, module.twist_of_wrench, surface.twist_of_wrench
+        unit = SCALING.twist_unit
+        factors = [surface.load_factor(each) for each in rows]
+        np.testing.assert_allclose(size(rows), factors, rtol=1e-12)
+    else:
+        size, map_, right = module.dissipation, module.wrench_of_twist, surface.wrench_of_twist
+        unit = SCALING.wrench_unit
+    rights = np.array([right(each) for each in rows])
+    assert scaled_error(np.asarray(map_(rows)), rights, unit).max() < 1e-12
+    assert np.isnan(size(bad)).all()
+    assert np.isnan(map_(bad)).all()
+    zero = np.zeros(3)
+    assert size(zero) == 0.0
+    assert np.isnan(map_(zero)).all()
+    assert np.array_equal(jax.grad(size)(zero), zero)
