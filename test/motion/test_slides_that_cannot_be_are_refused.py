@@ -140,3 +140,8 @@ def test_a_load_is_above_friction_along_itself_or_against():
     assert load.fraction(against) == pytest.approx(-0.5, abs=1e-12)
     assert load.next_above(0.5, 0.5, 0.6) == against
     assert load.next_above(math.inf, math.inf, 0.0) is None
+
+
+def test_an_inertia_that_is_none_is_named():
+    with pytest.raises(TypeError, match=r"must be an Inertia\(mass, moment\), got NoneType"):
+        slide(ROUND, None, (1.0, 0.0, 0.0))

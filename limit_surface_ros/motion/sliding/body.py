@@ -9,12 +9,12 @@ import numpy as np
 
 from limit_surface_ros.errors import DataError
 from limit_surface_ros.motion.sliding.friction import NormFriction, friction_of
+from limit_surface_ros.motion.sliding.inertia import Inertia
 from limit_surface_ros.motion.sliding.rest import null_space
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from limit_surface_ros.motion.sliding.inertia import Inertia
     from limit_surface_ros.surface.base import LimitSurface
 
 
@@ -35,11 +35,16 @@ class SlidingBody:
         largest: About the largest dissipation of such a twist [W].
 
     Raises:
+        TypeError: The inertia is not an `Inertia`.
         DataError: A motion that nothing resists would never end.
     """
 
     def __init__(self, surface: LimitSurface, inertia: Inertia) -> None:
         """Prepare friction and inertia."""
+        if not isinstance(inertia, Inertia):
+            raise TypeError(
+                f"inertia must be an Inertia(mass, moment), got {type(inertia).__name__}"
+            )
         self.surface, self.inertia = surface, inertia
         self.friction = friction_of(surface)
         self.root = np.linalg.cholesky(inertia.matrix).T

@@ -59,6 +59,7 @@ def slide(
         most_steps: Of the integration.
 
     Raises:
+        TypeError: The inertia is not an `Inertia`.
         ShapeError: Twist or pose is not three numbers.
         NotFiniteError: One of them is NaN or infinite.
         RangeError: Horizon or tolerance is not above 0.
