@@ -74,9 +74,12 @@ def draw_push(
     """
     with new_figure(8.0, 4.2) as figure:
         grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1.0))
-        _draw_way(figure.add_subplot(grid[:, 0]), run, outline, tip_radius, ends)
+        way = figure.add_subplot(grid[:, 0])
+        _draw_way(way, run, outline, tip_radius, ends)
         _draw_turn(figure.add_subplot(grid[0, 1]), run)
         _draw_force(figure.add_subplot(grid[1, 1]), run)
+        # Inside the axes it could cover where the body ends.
+        figure.legend(*way.get_legend_handles_labels(), loc="outside lower left", ncols=6)
         figure.suptitle(title or "a push along a path")
     return figure
 
@@ -135,7 +138,6 @@ def _draw_way(
     axes.set_aspect("equal")
     axes.set_xlabel("x [mm]")
     axes.set_ylabel("y [mm]")
-    axes.legend(loc="best")
 
 
 def _shade_modes(axes: Axes, run: PushRun) -> None:
