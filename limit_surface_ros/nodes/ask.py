@@ -219,17 +219,21 @@ def show(services: Names, topics: Names, wait: float) -> int:
 
 
 def call(client: ServiceClient, name: str, kind: Any, options: argparse.Namespace) -> int:
-    """Call a service and print what it answers."""
+    """Call a service and print what it answers, or why it refuses and nothing else."""
     request = filled(
         kind.Request(), options, lambda model: frame_of(client, name, model, options.wait)
     )
     response = client.call(kind, name, request, options.wait)
-    print(text_of(response))
     code = getattr(response, "error_code", ErrorCode.NONE)
-    refused = code != ErrorCode.NONE or not getattr(response, "success", True)
     if code != ErrorCode.NONE:
+        # The other fields of a refusal are zeros, which would read like an answer.
         print(f"ask: refused: {code_name(code)}: {response.error_msg}", file=sys.stderr)
-    return FAILED if refused else 0
+        return FAILED
+    if not getattr(response, "success", True):
+        print(f"ask: refused: {response.message}", file=sys.stderr)
+        return FAILED
+    print(text_of(response))
+    return 0
 
 
 def send(client: ServiceClient, name: str, kind: Any, options: argparse.Namespace) -> int:
