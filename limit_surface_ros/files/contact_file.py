@@ -57,6 +57,10 @@ SCHEMA = 1
 MOST_CELLS = 1_000_000
 
 
+_OF_FEET = (
+    "is for `points`; a patch says where its weight rests by "
+    "`pressure: {kind: linear, centre_of_pressure: [x, y]}`"
+)
 _ACCEPTED = "a contact has either `points` or a `shape`"
 # What hardly any body has: characteristic lengths [m], coefficients of friction, angles [rad].
 _LONG, _ROUGH, _TURN = 5.0, 2.0, 2.0 * pi
@@ -108,6 +112,8 @@ def read_contact(path: str | Path) -> ContactModel:
     if "points" in section:
         model = _read_points(section, name, frame_id, reference)
     elif "shape" in section:
+        if "centre_of_mass" in section:
+            raise section.error("centre_of_mass", _OF_FEET)
         model = _read_patch(section, name, frame_id, reference)
     else:
         raise section.error("points", f"missing; {_ACCEPTED}")
@@ -116,6 +122,7 @@ def read_contact(path: str | Path) -> ContactModel:
         outline: Outline | None = read_outline(section)
     else:
         outline = outline_of_shape(section.section("shape")) if "shape" in section else None
+        section.raw("outline", None)
     section.finish()
     return replace(model, symmetry=symmetry, doubts=(*model.doubts, *unlike), outline=outline)
 

@@ -210,7 +210,7 @@ class Section:
         """
         unknown = [key for key in self.values if key not in self._known]
         if unknown:
-            accepted = ", ".join(self._known)
+            accepted = ", ".join(dict.fromkeys(self._known))
             raise self.error(str(unknown[0]), f"is not known here; accepted are {accepted}")
 
     def _nested_floats(self, key: str, value: Any, levels: int) -> Floats:

@@ -188,6 +188,10 @@ def test_every_pressure_is_read(tmp_path, pressure):
             "normal_force: must be above 0",
         ),
         (POINTS + "friction_limits: [1, 1, 1]\ncolour: red\n", "colour: is not known"),
+        (
+            PATCH + "shape: {kind: disc, radius: 1}\ncentre_of_mass: [0, 0]\n",
+            "linear, centre_of_pr",
+        ),
         (PATCH + "shape: {kind: star}\n", r"shape.kind: must be one of polygon, .* bitmap"),
         (PATCH + "shape: {kind: disc, radius: -1}\n", "shape.radius: must be above 0"),
         (PATCH + "shape: {kind: disc, radius: 1, size: 2}\n", "shape.size: is not known"),
@@ -206,3 +210,10 @@ def test_every_pressure_is_read(tmp_path, pressure):
 def test_errors_name_the_key_and_what_is_accepted(tmp_path, text, message):
     with pytest.raises(FileError, match=message):
         read(tmp_path, text)
+
+
+def test_keys_that_are_accepted_are_each_listed_once(tmp_path):
+    with pytest.raises(FileError, match=r"accepted are schema, .*symmetry, outline") as error:
+        read(tmp_path, PATCH.replace("cells", "cels") + "shape: {kind: disc, radius: 1}\n")
+    listed = str(error.value).split("accepted are ")[1].split(", ")
+    assert len(set(listed)) == len(listed)
