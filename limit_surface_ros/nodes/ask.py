@@ -38,6 +38,10 @@ EXAMPLES = """examples:
 Fields that no option names are given in YAML, as to ros2:
   ask evaluate '{times: [0.0, 0.5, 1.0]}'
   ask linearise_push '{contact: {x: -0.05, y: 0.01}, input: [0.02, 0.0]}' --friction 0.3
+  ask simulate_push '{tip_radius: 0.005, tip_path: {poses: [
+      {pose: {position: {x: -0.1}}}, {pose: {position: {x: 0.05, y: 0.02}}}]}}' --frame table
+      (of a model with an outline)
+  ask predict_slide '{inertia: {inertia: {m: 0.3, izz: 0.0005}}}' --velocity 0.5 0 --frame object
 
 docs/tutorials/first_hour.md shows it at work; README.md lists services and topics, and
 limit_surface_interfaces/srv says what their fields are.

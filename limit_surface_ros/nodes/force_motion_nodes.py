@@ -2,7 +2,7 @@
 """The `limit_surface` and the `decay` node in one process and one executor.
 
 A parameter given as -p NAME:=VALUE goes to both; -p limit_surface:NAME:=VALUE and
--p decay:NAME:=VALUE, or a parameter file, address one.
+-p decay:NAME:=VALUE, or a parameter file, address one; in a namespace only the file does.
 """
 
 from __future__ import annotations

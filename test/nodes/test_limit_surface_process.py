@@ -8,11 +8,12 @@ import signal
 
 import numpy as np
 import pytest
+import yaml
 
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
 
-from limit_surface_interfaces.srv import WrenchToTwist
+from limit_surface_interfaces.srv import ListModels, WrenchToTwist
 
 from limit_surface_ros.files.surface_file import read_surface_model
 from limit_surface_ros.nodes import decay_node, limit_surface_node
@@ -171,3 +172,28 @@ def test_a_file_that_both_nodes_of_a_process_were_given_is_told_how_to_give_to_o
     assert code == 1
     assert "this is a limit surface, which the limit_surface node serves" in output
     assert '-p "limit_surface:model_files:=' in output
+
+
+def test_a_parameter_for_one_node_that_a_namespace_keeps_from_it_is_refused(model_file):
+    _, path = model_file()
+    files = f"limit_surface:model_files:=['{path}']"
+    arguments = ["--ros-args", "-r", "__ns:=/left", "-p", files]
+    with Program("force_motion_nodes", *arguments) as program:
+        code, output = program.ended()
+    assert code == 1
+    assert "give model_files in a parameter file, under /**/limit_surface: ros__param" in output
+
+
+def test_a_parameter_file_addresses_one_node_of_a_process_in_a_namespace(
+    ros, client_node, model_file, tmp_path
+):
+    _, path = model_file(name="crate")
+    parameters = {"/**/limit_surface": {"ros__parameters": {"model_files": [str(path)]}}}
+    file = tmp_path / "parameters.yaml"
+    file.write_text(yaml.safe_dump(parameters))
+    arguments = ["--ros-args", "-r", "__ns:=/left", "--params-file", str(file)]
+    with Program("force_motion_nodes", *arguments) as program:
+        call = ros.client(client_node, ListModels, "/left/limit_surface/list_models")
+        assert [each.name for each in call(ListModels.Request()).models] == ["crate"]
+        code, output = program.end()
+    assert code == 0, output

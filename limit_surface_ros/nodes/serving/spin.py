@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import re
 import signal
 import socket
 import sys
@@ -52,6 +53,10 @@ types."""
 _ADDRESSED = (
     "parameters go to all nodes of the process; -p NODE:NAME:=VALUE, such as "
     '-p "limit_surface:model_files:=[...]", and parameter files address one'
+)
+_IN_A_NAMESPACE = (
+    "-p {node}:NAME:=VALUE reaches no node in a namespace, and ROS 2 takes no namespace there: "
+    "give {name} in a parameter file, under /**/{node}: ros__parameters:"
 )
 # What names the folder of the log, for rcl.
 _HOMES = ("ROS_LOG_DIR", "ROS_HOME", "HOME")
@@ -139,6 +144,7 @@ def _run(
         logs = "--disable-external-lib-logs" not in argv
         if logs and not any(os.environ.get(name) for name in _HOMES):
             raise FileError(f"ROS 2 finds no place for its log: set one of {', '.join(_HOMES)}")
+        _refuse_what_reaches_no_node(argv, tables)
         rclpy.init(args=list(argv), signal_handler_options=SignalHandlerOptions.NO)
         with middleware.settings():
             nodes = make_nodes()
@@ -162,6 +168,20 @@ def _run(
         node.destroy_node()
     rclpy.try_shutdown()
     return 0
+
+
+def _refuse_what_reaches_no_node(argv: Sequence[str], names: Iterable[str]) -> None:
+    """Refuse parameters for one node that rcl drops without a word.
+
+    Raises:
+        RangeError: A node is in a namespace, which such a rule cannot name.
+    """
+    if not any(re.search(r"(^|:)__ns:=/.", each) for each in argv):
+        return
+    for each in argv:
+        rule = re.match(r"([^:]+):([^:=]+):=", each)
+        if rule and rule[1] in names and not rule[2].startswith("__"):
+            raise RangeError(_IN_A_NAMESPACE.format(node=rule[1], name=rule[2]))
 
 
 def _executor(nodes: Sequence[Any]) -> Executor:
