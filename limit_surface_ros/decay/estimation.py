@@ -371,6 +371,7 @@ class ResponseEstimator:
         # What is left later is the constant; products with later times would overflow.
         times = np.minimum(times, LATEST)
         centre = self.learnt(times)
+        self._catch_up()
         fits = [fit for fit in self._fits if fit.samples == self._best.samples] or [self._best]
         least = min(fit.evidence for fit in fits)
         weights = np.array([math.exp(-0.5 * (fit.evidence - least)) for fit in fits])
@@ -395,6 +396,19 @@ class ResponseEstimator:
             bounds = np.maximum(bounds, off + BOUND_DEVIATIONS * self._options.noise)
             bounds = np.where(times <= self.seen, bounds, math.inf)
         return bounds
+
+    def _catch_up(self) -> None:
+        """Fit the families that have not seen the last samples; the chosen one stays as it is.
+
+        They are fitted at each tenth sample only, and bounds need all of them.
+        """
+        deviations = self._deviations()
+        for fit in self._fits:
+            if fit.samples != self._best.samples:
+                try:
+                    fit.update(self._times, self._values, deviations, STEPS)
+                except np.linalg.LinAlgError:
+                    fit.evidence = math.inf
 
     def _room(self, times: Floats) -> Floats:
         """Return the bound that a polynomial beside the chosen family asks for, shape (n,)."""

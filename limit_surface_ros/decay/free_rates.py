@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import fft, linalg
 
+from limit_surface_ros.checks import counted
 from limit_surface_ros.decay.basis import as_rates, count_terms, real_basis
 from limit_surface_ros.decay.esprit import rates_of_subspace, signal_subspace
 from limit_surface_ros.decay.outliers import (
@@ -130,7 +131,7 @@ def free_rates(
         path.append(fit)
         tried.append(_judge(fit, search.problem.samples))
         if progress is not None:
-            progress(f"{count} terms: deviation {tried[-1].deviation:.4g}")
+            progress(f"{counted(count, 'term')}: deviation {tried[-1].deviation:.4g}")
         if tried[-1].bic < tried[best].bic:
             best = count - 1
         elif terms is None and count - 1 - best >= PATIENCE:

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy.special import erfcx
 
+from limit_surface_ros.decay import fit as fits
 from limit_surface_ros.decay.certify import certified_error
 from limit_surface_ros.decay.examples import EXAMPLES
 from limit_surface_ros.decay.exponential_sum import ExponentialSum
@@ -110,3 +111,10 @@ def test_nothing_is_proven_of_what_is_not_known():
     )
     with pytest.raises(RangeError, match="monotone, convex"):
         Analytic(lambda t: np.exp(-t), shape="round")
+
+
+def test_auto_takes_more_terms_than_a_response_that_is_known_anywhere_has_knots(monkeypatch):
+    monkeypatch.setattr(fits, "MOST_AUTO", 3)
+    found = fit_decay(EXAMPLES["f1"](), "auto", 6.0)
+    assert found.fit.sum.terms == 3
+    assert found.fit.max_error < 0.03

@@ -163,6 +163,14 @@ def test_noise_that_is_larger_than_stated_is_told_as_such():
     assert verdict.chi2_per_sample == pytest.approx(16.0, rel=0.4)
 
 
+def test_bounds_know_of_all_families_between_the_samples_at_which_all_are_fitted():
+    estimator = seen(TWO, faster(TWO, 0.8), count=33)
+    learnt = estimator.learnt(HORIZON)
+    estimator.bounds(HORIZON)
+    assert {fit.samples for fit in estimator._fits} == {33}
+    np.testing.assert_array_equal(estimator.learnt(HORIZON), learnt)
+
+
 def test_without_samples_nothing_is_corrected():
     estimator = ResponseEstimator(TWO, OPTIONS)
     assert estimator.learnt.sum is TWO

@@ -97,7 +97,7 @@ def tried_in_words(result: DecayFit) -> str:
     """Return the numbers of terms that were compared, with their criterion."""
     least = min(tried.bic for tried in result.terms_tried)
     return "BIC above the least: " + ", ".join(
-        f"{tried.terms} terms {tried.bic - least:.1f}" for tried in result.terms_tried
+        f"{counted(tried.terms, 'term')} {tried.bic - least:.1f}" for tried in result.terms_tried
     )
 
 
