@@ -19,10 +19,12 @@ LONGEST_NAME = 200
 
 
 def shortened(text: str, most: int = LONGEST_NAME) -> str:
-    """Return a text for a message, cut in its middle to `most` characters.
+    """Return a text for a message, in UTF-8 and cut in its middle to `most` characters.
 
-    What others chose, such as a name, may be a megabyte long, and stays in a log for ever.
+    What others chose, such as a name, may be a megabyte long, and stays in a log for ever. Bytes
+    of a file's name that are no UTF-8 become backslashes and digits: messages of ROS take none.
     """
+    text = text.encode("utf-8", "backslashreplace").decode()
     if len(text) <= most:
         return text
     cut = f" ... {len(text)} characters ... "

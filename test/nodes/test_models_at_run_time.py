@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import math
+import os
 import threading
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ import yaml
 pytest.importorskip("rclpy", reason="rclpy is not installed")
 pytest.importorskip("limit_surface_interfaces", reason="the interfaces are not built")
 
+from diagnostic_msgs.msg import DiagnosticArray
 from limit_surface_interfaces.msg import ErrorCode
 from limit_surface_interfaces.srv import DescribeModel, ListModels, WrenchToTwist
 from rclpy.parameter import Parameter
@@ -129,6 +132,26 @@ def test_a_bad_file_is_told_with_file_and_key(running):
     assert str(path) in answer.message
     assert "friction_force" in answer.message
     np.testing.assert_allclose(twist_now(ask), model.surface.twist_of_wrench(WRENCH))
+
+
+def test_a_bad_file_whose_name_is_no_utf_8_is_told_and_diagnostics_go_on(
+    ros, client_node, model_file, tmp_path
+):
+    _, path = model_file("box", seed=0)
+    ros.add(LimitSurfaceNode, files=[tmp_path], parameters={"diagnostics_period": 0.1})
+    reload = ros.client(client_node, Trigger, "/limit_surface/reload")
+    # As it comes out of an archive that was packed in Latin-1.
+    bad = Path(os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9.yaml"))
+    bad.write_text("schema: 1\nname: bad\n")
+    answer = reload(Trigger.Request())
+    assert not answer.success
+    assert rf"{tmp_path}/caf\udce9.yaml: kind: missing" in answer.message
+    arrays = ros.listen(client_node, DiagnosticArray, "/diagnostics")
+    ros.wait(lambda: any(r"caf\udce9" in v.value for a in arrays for v in a.status[0].values))
+    bad.write_bytes(path.read_bytes().replace(b"name: box", b"name: cup"))
+    answer = reload(Trigger.Request())
+    assert answer.success
+    assert "cup" in answer.message
 
 
 def test_a_file_that_vanished_is_told_and_the_node_goes_on(running):
