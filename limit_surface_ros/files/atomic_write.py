@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import secrets
 from pathlib import Path
 
@@ -12,10 +13,16 @@ from limit_surface_ros.errors import FileError
 
 # Characters of the name, of up to four bytes each, in that of the part: file systems take 255.
 _MOST = 50
+# A part so much older than the file that has just been written belongs to a write that was killed
+# [s]: none takes so long.
+_ABANDONED = 600.0
 
 
 def write_atomically(path: str | Path, content: str | bytes) -> None:
     """Write a file in one step: whoever reads sees all of it or what was there before.
+
+    A write that is killed leaves its part in the folder, a hidden file; a later one of the same
+    file removes it.
 
     Args:
         path: The file, in a folder that exists.
@@ -35,6 +42,7 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
             stream.flush()
             os.fsync(stream.fileno())
         part.replace(target)
+        _remove_abandoned(target)
     except FileError:
         raise
     except (OSError, RuntimeError, ValueError) as error:
@@ -65,6 +73,18 @@ def check_writable(path: str | Path) -> Path:
         # A name too long or with a NUL in it, no permission on the way, a loop of links.
         raise _unwritable(path, error) from None
     return target
+
+
+def _remove_abandoned(target: Path) -> None:
+    """Remove the parts that killed writes of a file, which has just been written, have left."""
+    part = re.compile(rf"\.{re.escape(target.name[:_MOST])}\.[0-9a-f]{{16}}")
+    # What is written stays written, even where nobody may list the folder or remove from it.
+    with contextlib.suppress(OSError), os.scandir(target.parent) as entries:
+        # By the clock of the file system, which may not be this machine's.
+        oldest = target.stat().st_mtime - _ABANDONED
+        for entry in entries:
+            if part.fullmatch(entry.name) and entry.stat(follow_symlinks=False).st_mtime < oldest:
+                Path(entry.path).unlink(missing_ok=True)
 
 
 def _target(path: str | Path) -> Path:

@@ -265,6 +265,18 @@ def test_a_link_keeps_pointing_where_it_did(tmp_path):
     assert (tmp_path / "model.yaml").read_text() == "new"
 
 
+def test_a_write_removes_what_killed_writes_of_the_same_file_left_behind(tmp_path):
+    kept = [".model.yaml.fedcba9876543210", ".box.yaml.0123456789abcdef", ".model.yaml.notes"]
+    ages = dict(zip([".model.yaml.0123456789abcdef", *kept], (700, 500, 700, 700), strict=True))
+    for name, age in ages.items():
+        part = tmp_path / name
+        part.write_text("half")
+        written = part.stat().st_mtime - age
+        os.utime(part, (written, written))
+    write_atomically(tmp_path / "model.yaml", "new")
+    assert {path.name for path in tmp_path.iterdir()} == {"model.yaml", *kept}
+
+
 def test_an_unknown_key_is_refused_with_those_that_are_known(section_of):
     section = section_of("outer: {known: 1, knwon: 2}").section("outer")
     section.number("known")
