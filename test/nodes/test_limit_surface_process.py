@@ -60,6 +60,7 @@ def test_another_process_is_served_until_a_signal_ends_it_cleanly(
         ("static_transforms:=['a b 1 2']", "static_transforms"),
         ("model_files:=/box.yaml", "model_files must be a list of texts: write ['/box.yaml']"),
         ("out_of_plane_tolerance:=text", "out_of_plane_tolerance"),
+        ("learn_file:=caf\udce9.yaml", "dce9.yaml' is not UTF-8, and ROS 2 takes no other"),
     ],
 )
 def test_a_bad_parameter_at_start_is_told_in_one_line(ros, model_file, broken, told):
