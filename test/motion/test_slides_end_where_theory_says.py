@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from motion_helpers import GRAVITY, Disc, dissipation_surface, random_inertia
+from motion_helpers import GRAVITY, Disc, body_on_points, dissipation_surface, random_inertia
 
 from limit_surface_ros.decay.exponential_sum import ExponentialSum
 from limit_surface_ros.motion.sliding.body import SlidingBody
@@ -187,6 +187,20 @@ def test_the_first_acceleration_is_that_of_least_constraint():
         assert still.time == 0.0
         assert not still.pose.any()
         assert not still.final_direction.any()
+
+
+def test_a_load_sets_bodies_on_points_off_where_some_turn_about_one_of_them():
+    """What is left of the load lies within the surface, and in a motion as much as friction."""
+    rng = np.random.default_rng(9)
+    for _ in range(150):
+        surface, inertia = body_on_points(rng)
+        wrench = rng.normal(size=3) * [1.0, 1.0, 0.05]
+        wrench *= rng.uniform(1.01, 2.5) / surface.load_factor(wrench)
+        friction = SlidingBody(surface, inertia).friction
+        a = acceleration(friction, inertia.matrix, wrench, surface.twist_of_wrench(wrench))
+        left = wrench - inertia.matrix @ a
+        assert surface.load_factor(left) < 1.0 + 1e-9
+        assert left @ a == pytest.approx(friction.sizes(a).sum(), rel=1e-9)
 
 
 def test_a_body_that_rests_without_load_stays():

@@ -101,7 +101,11 @@ class _Problem:
         for _ in range(_STEPS):
             if residual <= _EXACT:
                 break
-            move = np.linalg.solve(hessian, -gradient)
+            try:
+                move = np.linalg.solve(hessian, -gradient)
+            except np.linalg.LinAlgError:
+                # Beside a crease its curvature drowns the inertia.
+                break
             slope, share = float(gradient @ move), 1.0
             # Where rounding hides what is to be gained, the gradient tells.
             hidden = -slope <= 1e-11 * abs(height)
