@@ -48,7 +48,8 @@ def parser() -> argparse.ArgumentParser:
         "-o",
         type=Path,
         metavar="FILE",
-        help="file to write (default: the model's name with the target's suffix)",
+        help="file to write (default: the model's name with the target's suffix); as with all "
+        "programs, a file of that name is replaced, an input never",
     )
     top.add_argument(
         "--spheres",
