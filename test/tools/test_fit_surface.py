@@ -192,6 +192,7 @@ def test_the_automatic_fit_tells_how_many_pushes_its_regions_hold(pushes, tmp_pa
         (["--rows", "70"], "there is no row 70"),
         (["--rows", "0-99999999999"], "there is no row 99999999999; rows are 0 to 59"),
         (["--frame-id", ""], "--frame-id must not be empty"),
+        (["--reference-point", "0", "nan"], "--reference-point must be two numbers"),
         (["--seed", "-1"], "--seed must be from 0 to"),
         (["--motions", "0"], "--motions must be from 1 to 1000000, got 0"),
         (["--load-noise", "nan"], "--load-noise must be from 0 to 1000000, got nan"),
@@ -224,6 +225,23 @@ def test_pushes_that_state_no_frame_are_of_the_frame_object(pushes, tmp_path):
     output = tmp_path / "model.yaml"
     assert main([str(pushes), "-o", str(output), "--terms", "1", "--starts", "1"]) == 0
     assert read_surface_model(output).frame_id == "object"
+
+
+def test_pushes_are_about_the_point_that_is_stated(pushes, tmp_path, capsys):
+    output = tmp_path / "model.yaml"
+    few = [str(pushes), "-o", str(output), "--terms", "1", "--starts", "1"]
+    assert main([*few, "--reference-point", "0.01", "-0.02"]) == 0
+    assert "about       (0.01, -0.02) m in frame object" in capsys.readouterr().out
+    assert read_surface_model(output).reference_point == (0.01, -0.02)
+
+
+def test_a_contact_states_its_reference_point_itself(tmp_path, capsys):
+    contact = tmp_path / "contact.yaml"
+    contact.write_text(CONTACT)
+    output = str(tmp_path / "m.yaml")
+    assert main([str(contact), "-o", output, "--reference-point", "0", "0"]) == 2
+    told = capsys.readouterr().err
+    assert "--reference-point does nothing here: it is for a CSV of pushes" in told
 
 
 def test_costs_of_starts_are_told_in_one_short_line(tmp_path, capsys):

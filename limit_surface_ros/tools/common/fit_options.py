@@ -51,7 +51,7 @@ OBJECTIVES: dict[str, tuple[str, ...]] = {
 OF_CONTACTS = ("motions", "facet_loads", "load_noise", "motion_noise")
 OF_INPUTS = {
     BODY: ("link", "friction_coefficient", "normal_force"),
-    PUSHES: ("rows", *OF_CELLS),
+    PUSHES: ("rows", "reference_point", *OF_CELLS),
     BAG: OF_BAGS,
 }
 CHOSEN_BY_AUTO = ("kind", "terms", "family", "objective", "velocity_weight", "starts")
@@ -150,6 +150,14 @@ def _add_data_options(data: argparse._ArgumentGroup) -> None:
     )
     add_cell_options(data)
     data.add_argument(
+        "--reference-point",
+        type=float,
+        nargs=2,
+        metavar=("X", "Y"),
+        help="where in the model's frame the point is that the pushes of a CSV are about [m]; "
+        "default: its origin",
+    )
+    data.add_argument(
         "--anyway",
         action="store_true",
         help="fit to recorded pushes although their units, axes or signs are not those of a body",
@@ -200,6 +208,13 @@ def check_fit_options(options: argparse.Namespace) -> None:
         RangeError: One of them is out of its range; the message names the option.
     """
     check_ranges(options, RANGES)
+    for value in options.reference_point or ():
+        # NaN fails this.
+        if not abs(value) <= LARGEST_SCALE:
+            raise RangeError(
+                f"--reference-point must be two numbers from {-LARGEST_SCALE:.7g} to "
+                f"{LARGEST_SCALE:.7g}, got {value}"
+            )
 
 
 def refuse_options_of_others(

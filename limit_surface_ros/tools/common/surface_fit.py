@@ -161,6 +161,9 @@ def read_input(path: Path, options: argparse.Namespace) -> TrainingData:
         )
         return training_data_of_contact(path, contact, simulation, options.characteristic_length)
     pushes = training_data_of_pushes(path, options.rows, cell_options(options))
+    if options.reference_point is not None:
+        x, y = options.reference_point
+        pushes = replace(pushes, reference_point=(x, y))
     return checked(path, pushes, options.anyway)
 
 

@@ -55,7 +55,7 @@ class TrainingData:
         normal_force: [N], if the source states it.
         name: What the source calls the body, if it does.
         frame_id: Frame of the pairs, if the source states it.
-        reference_point: Of the contact that was simulated [m].
+        reference_point: About which the pairs are, in that frame [m].
         recorded: Whether the pairs were measured and not simulated.
         of_points: Whether `support` is the whole contact, and no patch cut into cells.
         symmetry: Axes about which a model is to be symmetric.
