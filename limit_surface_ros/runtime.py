@@ -47,18 +47,34 @@ def run(package: str, name: str) -> int:
         name: Its module there, which has a function `main`.
 
     Returns:
-        The exit code: what `main` returns, or 130 after an interrupt that it did not see to. A
-        node that is told to end while it is imported ends there and then, with 0.
+        The exit code: what `main` returns, 130 after an interrupt that it did not see to, or 1 if
+        whoever read the output has closed it, as `head` does. A node that is told to end while
+        it is imported ends there and then, with 0.
     """
     mend_standard_streams()
     if name in NODES:
         # Nothing has begun yet; whoever runs it takes any other code for a failure.
         on_ending(lambda *_: os._exit(0))
     try:
-        return int(importlib.import_module(f"{package}.{name}").main())
+        try:
+            return int(importlib.import_module(f"{package}.{name}").main())
+        finally:
+            # Also of a parser that ends the program after its help.
+            sys.stdout.flush()
+    except BrokenPipeError:
+        discard_unwritten_output()
+        return 1
     except KeyboardInterrupt:
         sys.stderr.write(f"{name}: interrupted\n")
         return INTERRUPTED
+
+
+def discard_unwritten_output() -> None:
+    """Lead standard output to the null device: the interpreter flushes it once more at its end."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def mend_standard_streams() -> None:

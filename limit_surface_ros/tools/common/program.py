@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import textwrap
 import warnings
@@ -12,7 +11,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from limit_surface_ros.errors import LimitSurfaceError
-from limit_surface_ros.runtime import INTERRUPTED, mend_standard_streams
+from limit_surface_ros.runtime import INTERRUPTED, discard_unwritten_output, mend_standard_streams
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -99,10 +98,10 @@ def run_program(
         print(f"{parser.prog}: {interrupted}", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
-        _discard_unwritten_output()
+        discard_unwritten_output()
         return FAILED
     except OSError as error:
-        _discard_unwritten_output()
+        discard_unwritten_output()
         print(f"{parser.prog}: error: {error}", file=sys.stderr)
         return FAILED
     return code or 0
@@ -129,14 +128,6 @@ def _plain_warnings(program: str) -> Iterator[None]:
         yield
     finally:
         warnings.showwarning = before
-
-
-def _discard_unwritten_output() -> None:
-    """Lead standard output to the null device: the interpreter flushes it once more at its end."""
-    try:
-        sys.stdout.flush()
-    except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextmanager
