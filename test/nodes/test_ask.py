@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 
 import numpy as np
@@ -182,6 +183,14 @@ def test_what_cannot_be_asked_is_told_in_one_line(box, ask, arguments, told):
     code, answer, error = ask(*arguments)
     assert (code, answer) == (2, "")
     assert told in error
+
+
+def test_an_argument_that_is_not_utf_8_is_told_in_one_line(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["ask", "caf\udce9"])
+    assert main() == 2
+    assert capsys.readouterr().err == (
+        "ask: error: an argument is not UTF-8, and ROS 2 takes no other\n"
+    )
 
 
 def test_what_is_not_there_is_told_with_what_is(box, capsys):

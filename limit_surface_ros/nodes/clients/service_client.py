@@ -11,6 +11,8 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.task import Future
 
+from limit_surface_ros.errors import RangeError
+
 if TYPE_CHECKING:
     from collections.abc import Callable
     from types import TracebackType
@@ -35,11 +37,18 @@ class ServiceClient:
     def __init__(
         self, name: str, patience: float = 10.0, alive: Callable[[], bool] = lambda: True
     ) -> None:
-        """Start the node and its thread."""
+        """Start the node and its thread.
+
+        Raises:
+            RangeError: An argument of the process holds bytes that are no UTF-8.
+        """
         self.patience = patience
         self.alive = alive
         self._context = rclpy.Context()
-        rclpy.init(context=self._context)
+        try:
+            rclpy.init(context=self._context)
+        except UnicodeEncodeError:
+            raise RangeError("an argument is not UTF-8, and ROS 2 takes no other") from None
         self.node = rclpy.create_node(name, context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
