@@ -39,6 +39,8 @@ def test_help_that_nobody_reads_is_no_error_to_tell(package, program):
     try:
         ended = subprocess.run(
             [sys.executable, "-c", command],
+            # What is not written at once is written at the end.
+            env=os.environ | {"PYTHONUNBUFFERED": ""},
             stdout=output,
             stderr=subprocess.PIPE,
             text=True,
