@@ -72,7 +72,7 @@ class Load:
         stream = self.pool.submit(
             soak_load.stream, prefix, seconds, self._model_file if ours else None
         )
-        warm_up = min(WARM_UP, seconds / 4)
+        warm_up = WARM_UP if seconds > WARM_UP else seconds / 4
         time.sleep(warm_up)
         start, used, before = time.perf_counter(), processor_seconds(node.pid), resident(node.pid)
         seen = stream.result()
