@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import itertools
 import os
 import re
 import signal
@@ -195,9 +196,10 @@ def _refuse_what_reaches_no_node(argv: Sequence[str], names: Iterable[str]) -> N
     """
     if not any(re.search(r"(^|:)__ns:=/.", each) for each in argv):
         return
-    for each in argv:
-        rule = re.match(r"([^:]+):([^:=]+):=", each)
-        if rule and rule[1] in names and not rule[2].startswith("__"):
+    for option, given in itertools.pairwise(argv):
+        rule = re.match(r"([^:]+):([^:=]+):=", given)
+        # Names of topics are remapped by -r for one node, whatever its namespace is.
+        if option in ("-p", "--param") and rule and rule[1] in names:
             raise RangeError(_IN_A_NAMESPACE.format(node=rule[1], name=rule[2]))
 
 
