@@ -395,7 +395,7 @@ def test_outliers_noise_and_terms_are_told_and_written(tmp_path, capsys):
     assert fit_decay.main([str(record), "-n", "auto", "-o", str(output)]) == 0
     printed = capsys.readouterr().out
     assert "3 samples left out, at 0.6, 2, 3.33 s" in printed
-    assert "BIC above the least: 1 terms 0.0, 2 terms" in printed
+    assert "BIC above the least: 1 term 0.0, 2 terms" in printed
     assert re.search(r"^assumed +after 5 s the response stays within", printed, re.MULTILINE)
     model = read_decay_model(output)
     assert model.norm == "2"
