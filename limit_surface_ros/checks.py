@@ -23,6 +23,8 @@ from limit_surface_ros.errors import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import ArrayLike, NDArray
 
     Floats: TypeAlias = NDArray[np.float64]
@@ -223,3 +225,19 @@ def as_name(what: str, text: str) -> str:
             f"got {shortened(repr(text))}"
         )
     return text
+
+
+def check_utf_8(arguments: Iterable[str]) -> None:
+    """Refuse arguments of a program that ROS 2 cannot take.
+
+    Raises:
+        RangeError: One holds bytes that are no UTF-8, as names of files may.
+    """
+    for each in arguments:
+        try:
+            each.encode()
+        except UnicodeEncodeError:
+            raise RangeError(
+                f"argument {shortened(each)!r} is not UTF-8, and ROS 2 takes no other: give the "
+                "file or folder another name"
+            ) from None

@@ -47,9 +47,10 @@ def run(package: str, name: str) -> int:
         name: Its module there, which has a function `main`.
 
     Returns:
-        The exit code: what `main` returns, 130 after an interrupt that it did not see to, or 1 if
-        whoever read the output has closed it, as `head` does. A node that is told to end while
-        it is imported ends there and then, with 0.
+        The exit code: what `main` returns, 130 after an interrupt that it did not see to, 1 after
+        an error of the system, such as a full disk, with a line, or without one if whoever read
+        the output has closed it, as `head` does. A node that is told to end while it is imported
+        ends there and then, with 0.
     """
     mend_standard_streams()
     if name in NODES:
@@ -61,8 +62,10 @@ def run(package: str, name: str) -> int:
         finally:
             # Also of a parser that ends the program after its help.
             sys.stdout.flush()
-    except BrokenPipeError:
+    except OSError as error:
         discard_unwritten_output()
+        if not isinstance(error, BrokenPipeError):
+            sys.stderr.write(f"{name}: error: {error}\n")
         return 1
     except KeyboardInterrupt:
         sys.stderr.write(f"{name}: interrupted\n")

@@ -10,6 +10,6 @@ The chain, each link of which can be used alone:
   kernel, its pieces, its characteristic roots, certified
 - `minimax`, `coefficients`: coefficients on fixed rates, certified
 - `fit`: all of it in one call
-- `basis`, `levels`, `exponential_sum`: the result, which is all that a node imports; `estimation`
-  and `response`: what a node does with it
+- `basis`, `levels`, `exponential_sum`: the result, which is all that a node imports;
+  `families`, `family_fit`, `estimation` and `response`: what a node does with it
 """

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What samples of a response say of its decay model, while they come in.
 
-Several families of responses near the model (`families`) are fitted to the samples by
-Gauss-Newton's method from where they were, with normal priors. The evidence of each,
-chi^2 + prior + log det (information) - log det (prior information), chooses among them: Occam's
-razor of Laplace's approximation [1]. Residuals are tested against the stated noise, so that a
+Several families of responses near the model (`families`) are fitted to the samples from where they
+were, with normal priors (`family_fit`). The evidence of each chooses among them: Occam's razor of
+Laplace's approximation [1]. Residuals are tested against the stated noise, so that a
 response of no family is told and not believed: nothing is stated then of what comes. Weights of
 their own follow much that is no sum of the model's exponentials, so that where nothing less
 follows the samples, bounds leave room for a polynomial beside them.
@@ -28,13 +27,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limit_surface_ros.checks import as_number, as_positive
-from limit_surface_ros.decay.families import FAMILIES, RATE_SPREAD, WEIGHT_SPREAD, Learnt
+from limit_surface_ros.decay.families import FAMILIES, WEIGHT_SPREAD, Learnt
+from limit_surface_ros.decay.family_fit import FamilyFit
 from limit_surface_ros.errors import RangeError
 
 if TYPE_CHECKING:
     from limit_surface_ros.checks import Floats
     from limit_surface_ros.decay.exponential_sum import ExponentialSum
-    from limit_surface_ros.decay.families import Family
 
 MOST_SAMPLES = 400
 # All families are fitted at each of the first samples, and then at each tenth.
@@ -44,15 +43,6 @@ FIRST_STEPS, STEPS = 4, 2
 ALIKE = 4.0
 # A family within so much of the best widens the bounds.
 CREDIBLE = 12.0
-# Tests of the residuals: so many deviations are too many, from so many samples on.
-MOST_DEVIATIONS, LEAST_TESTED = 4.0, 8
-# A misfit is smooth, noise is not: the sum of squares of so many slow waves of the residuals,
-# which noise makes larger than this once in a hundred thousand times, and larger than what is
-# doubtful once in a hundred. What a family could follow itself is no part of them; this share of a
-# wave keeps what is left of it apart from rounding.
-SLOW_WAVES, MOST_SLOW, DOUBTFUL, LEAST_LEFT = 4, 28.5, 13.3, 0.02
-# Rates that are by more than this prior deviation off the model's are not near it.
-MOST_RATE_DEVIATION = 3.0
 # Terms of the polynomial that weights leave room for, and the latest of its time over that seen.
 POLYNOMIAL_TERMS, FARTHEST = 3, 1e6
 # Deviations in a bound, and the last samples that a bound is not below if nothing fits.
@@ -132,116 +122,6 @@ class Verdict:
     chi2_per_sample: float = math.nan
     reason: str = ""
     followed: bool = True
-
-
-class _Fit:
-    """One family's numbers, and what they leave of the samples."""
-
-    def __init__(self, family: Family, systematic: float) -> None:
-        self.family = family
-        # How many deviations all residuals may be off alike.
-        self.systematic = systematic
-        self.numbers = family.mean
-        self.root = np.diag(1.0 / family.spread)
-        self.evidence = 0.0
-        self.chi2 = 0.0
-        self.freedom = 1
-        self.linked = 0.0
-        self.slow = 0.0
-        self.samples = 0
-        # Samples after the delay, which tell how it goes on.
-        self.after = 0
-
-    def update(self, times: Floats, values: Floats, deviations: Floats, steps: int) -> None:
-        """Move the numbers by so many steps of Gauss and Newton, and judge them."""
-        family = self.family
-        prior = 1.0 / family.spread
-        numbers, objective = self.numbers, math.inf
-
-        def residuals(numbers: Floats) -> tuple[Floats, Floats, Floats, float]:
-            """Return errors, how far the numbers are from their means, slopes and objective."""
-            fitted, slopes = family.values(times, numbers)
-            errors, away = (values - fitted) / deviations, (family.mean - numbers) * prior
-            return errors, away, slopes, float(errors @ errors + away @ away)
-
-        for _ in range(steps + 1):
-            errors, away, slopes, total = residuals(numbers)
-            if not total <= objective:
-                # Half the way back, once; the next sample brings another step.
-                numbers = family.bounded(0.5 * (numbers + self.numbers))
-                errors, away, slopes, total = residuals(numbers)
-                if not total <= objective:
-                    break
-            rows = np.concatenate([slopes / deviations[:, np.newaxis], np.diag(prior)])
-            information = rows.T @ rows
-            self.numbers, objective = numbers, total
-            self._judge(information, errors, away, prior, rows[: len(times)])
-            self.after = int(np.count_nonzero(times > family.delay(numbers)))
-            step = np.linalg.solve(information, rows.T @ np.concatenate([errors, away]))
-            numbers = family.bounded(numbers + step)
-            if float(np.abs(step * prior).max()) < 1e-6:
-                break
-
-    def _judge(
-        self, information: Floats, errors: Floats, away: Floats, prior: Floats, slopes: Floats
-    ) -> None:
-        self.root = np.linalg.cholesky(information).T
-        self.chi2 = float(errors @ errors)
-        self.freedom = max(1, len(errors) - len(prior))
-        self.linked = float(errors[1:] @ errors[:-1]) / math.sqrt(max(1, len(errors) - 1))
-        occam = 2.0 * float(np.log(np.diag(self.root)).sum() - np.log(prior).sum())
-        self.evidence = self.chi2 + float(away @ away) + occam
-        self.samples = len(errors)
-        self.slow = self._slow(errors, slopes)
-
-    def _slow(self, errors: Floats, slopes: Floats) -> float:
-        """Return the sum of squares of the residuals' slow waves, in units of what noise makes."""
-        count = len(errors)
-        turns = np.multiply.outer(np.arange(count) + 0.5, np.arange(1, SLOW_WAVES + 1)) / count
-        waves = math.sqrt(2.0 / count) * np.cos(np.pi * turns)
-        followed = np.linalg.solve(self.root.T, slopes.T @ waves)
-        left = (1.0 + LEAST_LEFT) * np.eye(SLOW_WAVES) - followed.T @ followed
-        sizes = waves.T @ errors
-        return float(sizes @ np.linalg.solve(left, sizes))
-
-    @property
-    def excess(self) -> float:
-        """How many deviations chi^2 is too large (Wilson and Hilferty's cube root)."""
-        share = 2.0 / (9.0 * self.freedom)
-        root = float((self.chi2 / self.freedom) ** (1.0 / 3.0))
-        return (root - 1.0 + share) / math.sqrt(share)
-
-    @property
-    def passes(self) -> bool:
-        """Whether the residuals are what noise would be."""
-        if self.samples < LEAST_TESTED:
-            return True
-        return self.excess <= MOST_DEVIATIONS and self.is_near and not self.is_smooth()
-
-    @property
-    def is_near(self) -> bool:
-        """Whether the rates are near those of the model."""
-        return abs(math.log(self.family.rate(self.numbers))) <= MOST_RATE_DEVIATION * RATE_SPREAD
-
-    @property
-    def is_doubtful(self) -> bool:
-        """Whether noise would hardly make such residuals, or the response has hardly begun."""
-        if self.samples < LEAST_TESTED:
-            return False
-        return self.after < LEAST_TESTED or self.is_smooth(most=DOUBTFUL)
-
-    def is_smooth(self, noise: float = 1.0, most: float = MOST_SLOW) -> bool:
-        """Tell whether residuals hang together as no noise of so many times the stated does."""
-        alike = math.sqrt(self.samples) * self.systematic
-        most_slow = (math.sqrt(most) * noise + alike) ** 2
-        most_linked = MOST_DEVIATIONS * noise**2 + alike * self.systematic
-        return self.slow > most_slow or self.linked > most_linked
-
-    def at(self, times: Floats) -> tuple[Floats, Floats]:
-        """Return the response and its standard deviation at times, each shape (n,)."""
-        fitted, _ = self.family.values(times, self.numbers)
-        inflated = math.sqrt(max(1.0, self.chi2 / self.freedom))
-        return fitted, inflated * self.family.spread_at(times, self.numbers, self.root)
 
 
 class ResponseEstimator:
@@ -402,13 +282,16 @@ class ResponseEstimator:
 
         They are fitted at each tenth sample only, and bounds need all of them.
         """
+        self._update([fit for fit in self._fits if fit.samples != self._best.samples], STEPS)
+
+    def _update(self, fits: list[FamilyFit], steps: int) -> None:
+        """Fit families to the samples; one that cannot be fitted is the least likely."""
         deviations = self._deviations()
-        for fit in self._fits:
-            if fit.samples != self._best.samples:
-                try:
-                    fit.update(self._times, self._values, deviations, STEPS)
-                except np.linalg.LinAlgError:
-                    fit.evidence = math.inf
+        for fit in fits:
+            try:
+                fit.update(self._times, self._values, deviations, steps)
+            except np.linalg.LinAlgError:
+                fit.evidence = math.inf
 
     def _room(self, times: Floats) -> Floats:
         """Return the bound that a polynomial beside the chosen family asks for, shape (n,)."""
@@ -442,7 +325,7 @@ class ResponseEstimator:
         deviations: Floats = self._options.noise * self._options.forgetting ** (-0.5 * self._ages)
         return deviations
 
-    def _reason(self, best: _Fit) -> str:
+    def _reason(self, best: FamilyFit) -> str:
         if self._changed:
             return "the response has changed, and what was learnt before no longer holds"
         if best.passes:
@@ -452,7 +335,7 @@ class ResponseEstimator:
             return "no family of responses near the model follows the measurements"
         return NOISY
 
-    def _spread(self, fit: _Fit) -> float:
+    def _spread(self, fit: FamilyFit) -> float:
         """Return the standard deviation of the first number."""
         unit = np.zeros(len(fit.numbers))
         unit[0] = 1.0
@@ -460,7 +343,7 @@ class ResponseEstimator:
 
     def _restart(self) -> None:
         systematic = self._options.model_error / self._options.noise
-        self._fits = [_Fit(family(self._model), systematic) for family in FAMILIES]
+        self._fits = [FamilyFit(family(self._model), systematic) for family in FAMILIES]
         self._best = self._fits[0]
         self._times, self._values = np.zeros(0), np.zeros(0)
         self._ages = np.zeros(0)
@@ -487,17 +370,11 @@ class ResponseEstimator:
 
     def _fit(self) -> None:
         count = len(self._times)
-        deviations = self._deviations()
         self._learnt = None
         if count > FIRST and self.accepted % EVERY:
-            self._best.update(self._times, self._values, deviations, STEPS - 1)
+            self._best.update(self._times, self._values, self._deviations(), STEPS - 1)
             return
-        steps = FIRST_STEPS if count <= 2 * EVERY else STEPS
-        for fit in self._fits:
-            try:
-                fit.update(self._times, self._values, deviations, steps)
-            except np.linalg.LinAlgError:
-                fit.evidence = math.inf
+        self._update(self._fits, FIRST_STEPS if count <= 2 * EVERY else STEPS)
         least = min(fit.evidence for fit in self._fits)
         self._best = next(fit for fit in self._fits if fit.evidence <= least + ALIKE)
         if self._changed and count >= 5 * self._options.change_after and self._best.passes:

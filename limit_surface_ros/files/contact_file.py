@@ -55,8 +55,6 @@ if TYPE_CHECKING:
 SCHEMA = 1
 # Cells of a patch at most: more take gigabytes, and loads are exact to 1e-6 long before.
 MOST_CELLS = 1_000_000
-
-
 _OF_FEET = (
     "is for `points`; a patch says where its weight rests by "
     "`pressure: {kind: linear, centre_of_pressure: [x, y]}`"
@@ -122,6 +120,7 @@ def read_contact(path: str | Path) -> ContactModel:
         outline: Outline | None = read_outline(section)
     else:
         outline = outline_of_shape(section.section("shape")) if "shape" in section else None
+        # It is accepted all the same, and told as such beside a key that is not.
         section.raw("outline", None)
     section.finish()
     return replace(model, symmetry=symmetry, doubts=(*model.doubts, *unlike), outline=outline)

@@ -129,6 +129,14 @@ def test_what_a_node_refuses_is_told_by_its_code_alone(box, ask):
     assert "UNKNOWN_MODEL" in told
 
 
+def test_a_refusal_that_has_no_code_is_told_alone_too(ros, box, model_file, ask):
+    model_file("box", seed=1)[1].write_text("kind: none\n")
+    code, answer, told = ask("limit_surface/reload")
+    assert (code, answer) == (1, "")
+    assert told.startswith("ask: refused: ")
+    assert told.endswith("the old models keep serving\n") or "box.yaml" in told
+
+
 def test_without_a_name_it_lists_what_can_be_asked(box, ask):
     code, answer, _ = ask()
     assert code == 0
@@ -188,9 +196,9 @@ def test_what_cannot_be_asked_is_told_in_one_line(box, ask, arguments, told):
 def test_an_argument_that_is_not_utf_8_is_told_in_one_line(monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["ask", "caf\udce9"])
     assert main() == 2
-    assert capsys.readouterr().err == (
-        "ask: error: an argument is not UTF-8, and ROS 2 takes no other\n"
-    )
+    told = capsys.readouterr().err
+    assert told.startswith(r"ask: error: argument 'caf\\udce9' is not UTF-8, and ROS 2 takes no")
+    assert told.count("\n") == 1
 
 
 def test_what_is_not_there_is_told_with_what_is(box, capsys):

@@ -62,6 +62,24 @@ def test_a_full_disk_is_told_in_one_line():
     assert "Traceback" not in ended.stderr
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
+def test_a_full_disk_is_told_in_one_line_by_programs_that_ask_nodes_too():
+    command = "import sys; from limit_surface_ros.runtime import nodes; "
+    command += "sys.argv = ['ask', '--help']; sys.exit(nodes.ask())"
+    with Path("/dev/full").open("w") as full:
+        ended = subprocess.run(
+            [sys.executable, "-c", command],
+            env=os.environ | {"PYTHONUNBUFFERED": ""},
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    assert ended.returncode == 1
+    assert ended.stderr.startswith("ask: error: ")
+    assert ended.stderr.count("\n") == 1
+
+
 EXPORT = [sys.executable, "-m", "limit_surface_ros.tools.export_surface"]
 
 
@@ -94,28 +112,32 @@ def test_a_name_that_the_encoding_does_not_have_is_printed_all_the_same(tmp_path
     assert output.exists()
 
 
-@pytest.mark.parametrize("package", ["tools", "nodes"])
-def test_an_interrupt_while_a_program_still_imports_is_told_in_one_line(tmp_path, package):
-    program = {"tools": "fit_surface", "nodes": "demo"}[package]
-    # Whichever is imported first is interrupted.
-    stand_in = (
-        "import os, signal, time\n"
-        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "os.kill(os.getpid(), signal.SIGINT)\n"
-        "time.sleep(3600)\n"
-    )
+def run_while_it_imports(folder, stand_in, package, program, begin=""):
+    """Run a program that finds a module of the test in place of what it imports first."""
     for name in ("numpy", "rclpy", "geometry_msgs"):
-        (tmp_path / f"{name}.py").write_text(stand_in)
-    command = f"import sys; from limit_surface_ros.runtime import {package}; "
+        (folder / f"{name}.py").write_text(stand_in)
+    command = f"{begin}import sys; from limit_surface_ros.runtime import {package}; "
     command += f"sys.exit({package}.{program}())"
-    paths = os.pathsep.join([str(tmp_path), str(REPOSITORY), os.environ.get("PYTHONPATH", "")])
-    ended = subprocess.run(
+    paths = os.pathsep.join([str(folder), str(REPOSITORY), os.environ.get("PYTHONPATH", "")])
+    return subprocess.run(
         [sys.executable, "-c", command],
         env=os.environ | {"PYTHONPATH": paths},
         capture_output=True,
         text=True,
         check=False,
     )
+
+
+@pytest.mark.parametrize("package", ["tools", "nodes"])
+def test_an_interrupt_while_a_program_still_imports_is_told_in_one_line(tmp_path, package):
+    program = {"tools": "fit_surface", "nodes": "demo"}[package]
+    stand_in = (
+        "import os, signal, time\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "os.kill(os.getpid(), signal.SIGINT)\n"
+        "time.sleep(3600)\n"
+    )
+    ended = run_while_it_imports(tmp_path, stand_in, package, program)
     assert ended.returncode == 130
     assert ended.stderr == f"{program}: interrupted\n"
 
@@ -124,18 +146,8 @@ def test_an_interrupt_while_a_program_still_imports_is_told_in_one_line(tmp_path
 @pytest.mark.parametrize("program", runtime.NODES)
 def test_a_node_that_is_told_to_end_while_it_imports_ends_with_0(tmp_path, program, number):
     stand_in = f"import os, time; os.kill(os.getpid(), {int(number)}); time.sleep(3600)\n"
-    for name in ("numpy", "rclpy", "geometry_msgs"):
-        (tmp_path / f"{name}.py").write_text(stand_in)
-    command = "import signal, sys; signal.signal(signal.SIGHUP, signal.SIG_DFL); "
-    command += f"from limit_surface_ros.runtime import nodes; sys.exit(nodes.{program}())"
-    paths = os.pathsep.join([str(tmp_path), str(REPOSITORY), os.environ.get("PYTHONPATH", "")])
-    ended = subprocess.run(
-        [sys.executable, "-c", command],
-        env=os.environ | {"PYTHONPATH": paths},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    begin = "import signal; signal.signal(signal.SIGHUP, signal.SIG_DFL); "
+    ended = run_while_it_imports(tmp_path, stand_in, "nodes", program, begin)
     assert (ended.returncode, ended.stdout + ended.stderr) == (0, "")
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.task import Future
 
-from limit_surface_ros.errors import RangeError
+from limit_surface_ros.checks import check_utf_8
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,15 +41,13 @@ class ServiceClient:
         """Start the node and its thread.
 
         Raises:
-            RangeError: An argument of the process holds bytes that are no UTF-8.
+            RangeError: An argument of the process is not UTF-8.
         """
         self.patience = patience
         self.alive = alive
         self._context = rclpy.Context()
-        try:
-            rclpy.init(context=self._context)
-        except UnicodeEncodeError:
-            raise RangeError("an argument is not UTF-8, and ROS 2 takes no other") from None
+        check_utf_8(sys.argv)
+        rclpy.init(context=self._context)
         self.node = rclpy.create_node(name, context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)

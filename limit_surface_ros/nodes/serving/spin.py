@@ -30,7 +30,8 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
-from limit_surface_ros.errors import FileError, LimitSurfaceError, RangeError, shortened
+from limit_surface_ros.checks import check_utf_8
+from limit_surface_ros.errors import FileError, LimitSurfaceError, RangeError
 from limit_surface_ros.nodes.serving import middleware
 from limit_surface_ros.nodes.serving.settings import Setting, help_of
 from limit_surface_ros.runtime import keep_large_pieces, mend_standard_streams, on_ending
@@ -136,7 +137,7 @@ def _run(
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     try:
-        _refuse_what_is_not_utf_8(argv)
+        check_utf_8(argv)
         _, unknown = parser.parse_known_args(remove_ros_args(list(argv))[1:])
         if unknown:
             parser.error(
@@ -170,22 +171,6 @@ def _run(
         node.destroy_node()
     rclpy.try_shutdown()
     return 0
-
-
-def _refuse_what_is_not_utf_8(argv: Sequence[str]) -> None:
-    """Refuse arguments that rclpy cannot hand over.
-
-    Raises:
-        RangeError: One holds bytes that are no UTF-8, as names of files may.
-    """
-    for each in argv:
-        try:
-            each.encode()
-        except UnicodeEncodeError:
-            raise RangeError(
-                f"argument {shortened(each)!r} is not UTF-8, and ROS 2 takes no other: give the "
-                "file or folder another name"
-            ) from None
 
 
 def _refuse_what_reaches_no_node(argv: Sequence[str], names: Iterable[str]) -> None:
