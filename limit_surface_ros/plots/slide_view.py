@@ -44,7 +44,8 @@ def draw_slide(
     """
     with new_figure(8.0, 4.2) as figure:
         grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1.0))
-        _draw_way(figure.add_subplot(grid[:, 0]), found, outline)
+        way = figure.add_subplot(grid[:, 0])
+        _draw_way(way, found, outline)
         _draw_motion(figure.add_subplot(grid[0, 1]), found)
         second = figure.add_subplot(grid[1, 1])
         if load is None:
@@ -52,6 +53,8 @@ def draw_slide(
         else:
             _draw_load(second, found, surface, load)
         second.set_xlabel("time [s]")
+        # Inside the axes it could cover where the body rests.
+        figure.legend(*way.get_legend_handles_labels(), loc="outside lower left", ncols=6)
         figure.suptitle(title or "a slide to rest")
     return figure
 
@@ -76,7 +79,6 @@ def _draw_way(axes: Axes, found: Slide, outline: Floats) -> None:
     axes.set_aspect("equal")
     axes.set_xlabel("x [mm]")
     axes.set_ylabel("y [mm]")
-    axes.legend(loc="best")
 
 
 def _shade_rests(axes: Axes, found: Slide) -> None:

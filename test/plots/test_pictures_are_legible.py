@@ -13,9 +13,12 @@ from matplotlib.text import Text
 
 from limit_surface_ros.motion.outline import Polygon
 from limit_surface_ros.motion.rollout import simulate_push
+from limit_surface_ros.motion.sliding.inertia import Inertia
+from limit_surface_ros.motion.sliding.slide import slide
 from limit_surface_ros.plots.canvas import new_figure
 from limit_surface_ros.plots.distributions import draw_distributions
 from limit_surface_ros.plots.push_view import draw_push
+from limit_surface_ros.plots.slide_view import draw_slide
 from limit_surface_ros.plots.surface_view import draw_solid, draw_surfaces
 from limit_surface_ros.surface.kinds.point_contacts import PointContacts
 from limit_surface_ros.surface.scaling import Scaling
@@ -101,15 +104,27 @@ def test_models_that_are_all_exact_are_drawn():
     assert axes.get_xlim()[1] > 0.0
 
 
-def test_the_legend_of_a_push_covers_no_part_of_it():
-    outline = Polygon([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    run = simulate_push(BODY, outline, 0.1, 0.3, [0, 0, 0], [[-1.5, 0.4], [1.0, 0.2]])
-    figure = draw_push(run, outline, 0.1)
+SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+
+
+def picture_of_a_push():
+    outline = Polygon(SQUARE)
+    return draw_push(
+        simulate_push(BODY, outline, 0.1, 0.3, [0, 0, 0], [[-1.5, 0.4], [1.0, 0.2]]), outline, 0.1
+    )
+
+
+def picture_of_a_slide():
+    return draw_slide(slide(BODY, Inertia(1.0, 1.0), (1.0, 0.3, 2.0)), SQUARE, BODY)
+
+
+@pytest.mark.parametrize("picture", [picture_of_a_push, picture_of_a_slide])
+def test_the_legend_of_a_way_covers_no_part_of_it(picture):
+    figure = picture()
     FigureCanvasAgg(figure).draw()
     (legend,) = figure.legends
     box = legend.get_window_extent()
     assert figure.bbox.x0 <= box.x0 < box.x1 <= figure.bbox.x1
     assert figure.bbox.y0 <= box.y0
     for axes in figure.axes:
-        assert axes.get_legend() is None
         assert box.y1 <= axes.get_tightbbox().y0
