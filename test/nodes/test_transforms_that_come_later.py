@@ -195,7 +195,7 @@ def test_of_more_than_the_queue_holds_the_oldest_is_refused(moving, monkeypatch)
     bench.come(10 * SECOND, 0.1)
     for step in range(1, 6):
         bench.publish(10 * SECOND + step)
-    assert bench.node.health.refused["wrench", "UNAVAILABLE"] == 2
+    bench.ros.wait(lambda: bench.node.health.refused["wrench", "UNAVAILABLE"] == 2)
     bench.come(11 * SECOND, 0.1)
     bench.ros.wait(lambda: len(bench.answers) == 3)
     assert [time_of(answer) - 10 * SECOND for answer in bench.answers] == [3, 4, 5]
@@ -245,7 +245,8 @@ def test_of_a_transform_that_cannot_be_used_the_message_names_the_transform(
     assert reason in said
     assert "wrench" not in said
     bench.publish(10 * SECOND)
-    assert bench.node.health.refused["wrench", "UNKNOWN_FRAME"] == 1
+    # It counts as waiting for a moment, before it is refused.
+    bench.ros.wait(lambda: bench.node.health.refused["wrench", "UNKNOWN_FRAME"] == 1)
     # The next one that is in order is used, and needs no unit length.
     bench.buffer.rotation = (0.0, 0.0, 0.0, -7e-5)
     bench.come(11 * SECOND, 0.1)
